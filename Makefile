@@ -1,0 +1,58 @@
+# The two commands of the README are `make run` and `make test`; both install what is missing.
+.PHONY: help install run test check format bench clean
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+SOURCES := pyproject.toml constraints.txt
+
+# uv installs faster; pip does the same.
+ifneq ($(shell command -v uv 2>/dev/null),)
+PIP_INSTALL := uv pip install --quiet --python $(BIN)/python --constraint constraints.txt
+else
+PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
+endif
+
+help: ## show this list
+	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
+
+install: $(VENV)/.installed ## install FRAS and all its services into .venv
+
+$(VENV)/bin/python:
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "FRAS needs Python 3.11 or newer: make PYTHON=...")'
+	$(PYTHON) -m venv $(VENV)
+
+$(VENV)/.installed: $(SOURCES) | $(VENV)/bin/python
+	@echo "installing FRAS into $(VENV) (a minute or two)"
+	$(PIP_INSTALL) --editable '.[all]'
+	@echo "compiling the finite-element kernels (once, about half a minute)"
+	$(BIN)/python -c 'from fras_sim.fem import compile_kernels; compile_kernels()'
+	@touch $@
+
+$(VENV)/.installed-dev: $(VENV)/.installed
+	@echo "installing the tools of the tests and checks"
+	$(PIP_INSTALL) --editable '.[dev]'
+	@touch $@
+
+run: $(VENV)/.installed ## run one complete autonomous retraction
+	$(BIN)/fras run
+
+test: $(VENV)/.installed-dev ## run all tests, those with real processes too
+	$(BIN)/python -m pytest
+
+check: $(VENV)/.installed-dev ## lint, format, types, import contracts
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/lint-imports
+	$(BIN)/pyright
+
+format: $(VENV)/.installed-dev ## format and mend what can be mended
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+bench: $(VENV)/.installed-dev ## measure; figures belong into docs/benchmarks.md
+	$(BIN)/python -m benchmarks.loop
+
+clean: ## remove what was built; runs/ stays
+	rm -rf $(VENV) build dist .pytest_cache .ruff_cache .import_linter_cache .hypothesis
+	find services tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +
