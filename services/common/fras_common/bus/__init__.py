@@ -1,0 +1,24 @@
+"""The bus: publish, subscribe, ask, serve, be seen. Two implementations of one contract."""
+
+from fras_common.bus.contract import (
+    Bus,
+    BusClosed,
+    Call,
+    NoAnswer,
+    Publisher,
+    RawSample,
+    RemoteFault,
+)
+from fras_common.bus.memory_bus import MemoryBus, MemoryFabric
+
+__all__ = [
+    "Bus",
+    "BusClosed",
+    "Call",
+    "MemoryBus",
+    "MemoryFabric",
+    "NoAnswer",
+    "Publisher",
+    "RawSample",
+    "RemoteFault",
+]

@@ -1,0 +1,135 @@
+"""What a bus promises. Tests run one contract suite on every implementation.
+
+- Order holds within a key, not across keys: join by tick.
+- Callbacks run on threads of the bus; they must only append to an inbox.
+- A put never blocks for a slow or frozen subscriber.
+- A payload that does not fit its key reaches the `on_malformed` of the bus, never a callback.
+- After `close` nothing is delivered and every call raises `BusClosed`; a question still open ends
+  with `NoAnswer`.
+- A publisher may be used from several threads: samples travel in the order of their `seq`.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol, TypeVar
+
+from fras_common.codec import MalformedMessage
+from fras_common.errors import FrasError
+from fras_common.messages import Fault, Header
+from fras_common.topics import Query, Topic
+
+M = TypeVar("M", bound=Header)
+Req = TypeVar("Req")
+Rep = TypeVar("Rep")
+Req_co = TypeVar("Req_co", covariant=True)
+Rep_contra = TypeVar("Rep_contra", contravariant=True)
+
+
+class NoAnswer(FrasError):
+    """Nobody serves the query, or not within the time allowed."""
+
+    key: str
+
+    def __init__(self, key: str, timeout_s: float) -> None:
+        super().__init__(
+            f"{key}: no answer within {timeout_s} s; is the service that serves it running?",
+            key=key,
+            timeout_s=timeout_s,
+        )
+
+
+class RemoteFault(FrasError):
+    """The server refused or failed; `remote_kind` is the error's type over there."""
+
+    remote_kind: str
+
+    def __init__(self, key: str, fault: Fault) -> None:
+        super().__init__(f"{key}: {fault.kind}: {fault.text}", key=key, remote_kind=fault.kind)
+
+
+class BusClosed(FrasError):
+    """The bus was used after it was closed."""
+
+
+@dataclass(frozen=True)
+class RawSample:
+    """A sample as it stood on the wire, for who records verbatim."""
+
+    key: str
+    payload: bytes
+    encoding: str
+
+
+class Publisher(Protocol[M]):
+    """Publishes one key; fills `stamp_ns`, `seq` and `source` of the header."""
+
+    def put(self, message: M) -> M:
+        """Publish, and return the message as it was stamped."""
+        ...
+
+
+class Call(Protocol[Req_co, Rep_contra]):
+    """A query that waits for its answer; exactly one of `reply` and `fail` must be called."""
+
+    @property
+    def request(self) -> Req_co:
+        """What was asked, decoded and validated."""
+        ...
+
+    def reply(self, reply: Rep_contra) -> None:
+        """Answer."""
+        ...
+
+    def fail(self, error: FrasError) -> None:
+        """Answer with an error that keeps its type's name."""
+        ...
+
+
+OnMalformed = Callable[[MalformedMessage], None]
+OnReply = Callable[[Any], None]
+
+
+class Bus(Protocol):
+    """One participant's connection, within one cell."""
+
+    def publisher(self, topic: Topic[M]) -> Publisher[M]:
+        """Declare a publisher on a concrete key."""
+        ...
+
+    def subscribe(self, topic: Topic[M], callback: Callable[[M], None]) -> None:
+        """Receive every message of a key or family; latched topics deliver their last value."""
+        ...
+
+    def subscribe_raw(self, key_expr: str, callback: Callable[[RawSample], None]) -> None:
+        """Receive samples undecoded, with what the publishers still cache."""
+        ...
+
+    def serve(self, query: Query[Req, Rep], callback: Callable[[Call[Req, Rep]], None]) -> None:
+        """Answer a query."""
+        ...
+
+    def ask(
+        self,
+        query: Query[Req, Rep],
+        request: Req,
+        on_done: Callable[[Rep | FrasError], None],
+        timeout_s: float,
+    ) -> None:
+        """Ask without waiting; `on_done` gets the reply, `RemoteFault`, `NoAnswer` or malformed."""
+        ...
+
+    def query(self, query: Query[Req, Rep], request: Req, timeout_s: float) -> Rep:
+        """Ask and wait; raises what `ask` would deliver."""
+        ...
+
+    def announce(self, token: str) -> None:
+        """Declare a liveliness token, e.g. `ready/sim`; it goes when this bus does."""
+        ...
+
+    def watch_tokens(self, callback: Callable[[str, bool], None]) -> None:
+        """Report each token that appears (True) or goes (False), those present first."""
+        ...
+
+    def close(self) -> None:
+        """Undeclare everything and close; idempotent."""
+        ...

@@ -1,0 +1,86 @@
+"""What every implementation of the bus does alike: stamping, and turning outcomes into errors."""
+
+import itertools
+import threading
+from collections.abc import Callable
+from typing import Any, Generic, TypeVar
+
+import msgspec
+
+from fras_common.bus.contract import NoAnswer
+from fras_common.errors import FrasError
+from fras_common.messages import Header
+from fras_common.topics import Query
+
+M = TypeVar("M", bound=Header)
+T = TypeVar("T")
+Rep = TypeVar("Rep")
+
+
+class Stamper:
+    """Fills the header fields that belong to the publisher.
+
+    Parameters
+    ----------
+    source : str
+        Service and instance, `sim/3f2a`.
+    clock_ns : callable
+        Wall clock [ns since the Unix epoch].
+    """
+
+    def __init__(self, source: str, clock_ns: Callable[[], int]) -> None:
+        self._source = source
+        self._clock_ns = clock_ns
+        self._count = itertools.count()
+
+    def stamp(self, message: M) -> M:
+        """Return the message with stamp, sequence number and source filled."""
+        return msgspec.structs.replace(
+            message, stamp_ns=self._clock_ns(), seq=next(self._count), source=self._source
+        )
+
+
+class Answer(Generic[T]):
+    """Collects the one outcome of a query; later ones are ignored."""
+
+    def __init__(self, on_done: Callable[[T | FrasError], None]) -> None:
+        self._on_done = on_done
+        self._first = threading.Lock()
+
+    def settle(self, outcome: T | FrasError) -> None:
+        """Deliver the first outcome; reply and timeout race on threads of their own."""
+        if self._first.acquire(blocking=False):
+            self._on_done(outcome)
+
+    def expire(self, key: str, timeout_s: float) -> None:
+        """Deliver `NoAnswer` unless an outcome came before."""
+        self.settle(NoAnswer(key, timeout_s))
+
+
+def wait_for(
+    ask: Callable[[Callable[[Rep | FrasError], None]], None],
+    query: Query[Any, Rep],
+    timeout_s: float,
+) -> Rep:
+    """Turn a non-blocking `ask` into a blocking one.
+
+    Raises
+    ------
+    FrasError
+        What the query ended with, if not with a reply.
+    """
+    done = threading.Event()
+    outcomes: list[Rep | FrasError] = []
+
+    def on_done(outcome: Rep | FrasError) -> None:
+        outcomes.append(outcome)
+        done.set()
+
+    ask(on_done)
+    # The bus itself ends the query in time; the margin only covers a bus that dies meanwhile.
+    if not done.wait(timeout_s + 1.0):
+        raise NoAnswer(query.key, timeout_s)
+    outcome = outcomes[0]
+    if isinstance(outcome, FrasError):
+        raise outcome
+    return outcome

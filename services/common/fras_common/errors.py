@@ -1,0 +1,25 @@
+"""The one tree of errors: each carries its values as attributes, its text says what to do."""
+
+
+class FrasError(Exception):
+    """Base of every error that FRAS raises on purpose.
+
+    Parameters
+    ----------
+    text : str
+        What was wrong, where, and what to do about it.
+    **values
+        The numbers and names behind the text; they become attributes, so that a shell can
+        publish them and a test can read them without parsing prose.
+    """
+
+    def __init__(self, text: str, **values: object) -> None:
+        super().__init__(text)
+        self.values = values
+        for name, value in values.items():
+            setattr(self, name, value)
+
+    @property
+    def kind(self) -> str:
+        """Name that travels with the error over the bus."""
+        return type(self).__name__

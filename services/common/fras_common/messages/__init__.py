@@ -1,0 +1,77 @@
+"""Every message that crosses a process boundary, one module per producer.
+
+All are frozen `msgspec.Struct` types, encoded as MessagePack maps: field names travel, units stand
+in the names (`_m`, `_n`, `_pa`, `_s`, `_rad`). A published message starts with the five fields of
+`Header`; a request or reply of a query has none.
+"""
+
+from fras_common.messages.base import Array, Header, Pose, Quaternion, Vec3
+from fras_common.messages.motion import (
+    ActionResult,
+    ExecuteReply,
+    ExecuteRequest,
+    HoldRequest,
+    HoldState,
+    ResumeRequest,
+)
+from fras_common.messages.planner import (
+    NoPlan,
+    Plan,
+    PlannedAction,
+    TaskReply,
+    TaskRequest,
+    TaskStatus,
+)
+from fras_common.messages.recorder import CloseReply, CloseRequest, OpenRequest, RecorderStatus
+from fras_common.messages.robot import ActionState, ArmState, RobotState
+from fras_common.messages.sa import Context, ContextRequest, TargetReply, TargetRequest, Verdict
+from fras_common.messages.service import (
+    Fault,
+    Health,
+    LogRecord,
+    ResetReply,
+    ResetRequest,
+    RpcRecord,
+)
+from fras_common.messages.sim import SolverReport, TissueModel, TissueState
+
+__all__ = [
+    "ActionResult",
+    "ActionState",
+    "ArmState",
+    "Array",
+    "CloseReply",
+    "CloseRequest",
+    "Context",
+    "ContextRequest",
+    "ExecuteReply",
+    "ExecuteRequest",
+    "Fault",
+    "Header",
+    "Health",
+    "HoldRequest",
+    "HoldState",
+    "LogRecord",
+    "NoPlan",
+    "OpenRequest",
+    "Plan",
+    "PlannedAction",
+    "Pose",
+    "Quaternion",
+    "RecorderStatus",
+    "ResetReply",
+    "ResetRequest",
+    "ResumeRequest",
+    "RobotState",
+    "RpcRecord",
+    "SolverReport",
+    "TargetReply",
+    "TargetRequest",
+    "TaskReply",
+    "TaskRequest",
+    "TaskStatus",
+    "TissueModel",
+    "TissueState",
+    "Vec3",
+    "Verdict",
+]

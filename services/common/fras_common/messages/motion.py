@@ -1,0 +1,61 @@
+"""Commands to motion and their results."""
+
+from typing import Literal
+
+from fras_common.messages.base import Header, Vec3, Wire, require_finite
+
+ActionOutcome = Literal["succeeded", "failed", "interrupted", "aborted"]
+
+
+class ExecuteRequest(Wire, frozen=True, kw_only=True):
+    """One action for one arm; `target_m` in the world frame for reach and move."""
+
+    trial: str
+    goal_id: str
+    name: str
+    arm: str
+    block: str
+    target_m: Vec3 | None
+
+    def __post_init__(self) -> None:
+        if self.target_m is not None:
+            require_finite("target_m", *self.target_m)
+
+
+class ExecuteReply(Wire, frozen=True, kw_only=True):
+    """Whether the goal was accepted, and if not, the named reason."""
+
+    accepted: bool
+    reason: str
+
+
+class ActionResult(Header, frozen=True, kw_only=True):
+    """How an action ended."""
+
+    goal_id: str
+    name: str
+    arm: str
+    block: str
+    outcome: ActionOutcome
+    reason: str
+
+
+class HoldRequest(Wire, frozen=True, kw_only=True):
+    """Stop; `holder` owns this hold until it is lifted."""
+
+    holder: str
+    reason: str
+
+
+class ResumeRequest(Wire, frozen=True, kw_only=True):
+    """Lift the hold of `holder`; `by` says who asks."""
+
+    holder: str
+    by: str
+
+
+class HoldState(Wire, frozen=True, kw_only=True):
+    """Holds in force after the request, holder to reason, and the tick that was current."""
+
+    holds: dict[str, str]
+    tick: int

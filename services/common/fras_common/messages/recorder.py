@@ -1,0 +1,42 @@
+"""Commands to the recorder and its status."""
+
+from typing import Literal
+
+from fras_common.messages.base import Header, Wire
+from fras_common.scenario.model import Scenario
+
+
+class OpenRequest(Wire, frozen=True, kw_only=True):
+    """Start the log of a trial in `directory` (on the recorder's host)."""
+
+    trial: str
+    scenario: Scenario
+    mesh: bytes
+    directory: str
+
+
+class CloseRequest(Wire, frozen=True, kw_only=True):
+    """Finish the log once it holds every tick up to `last_tick` and the status `status_seq`."""
+
+    trial: str
+    last_tick: int
+    status_seq: int
+
+
+class CloseReply(Wire, frozen=True, kw_only=True):
+    """What the finished file holds."""
+
+    path: str
+    messages: int
+    lost: int
+
+
+class RecorderStatus(Header, frozen=True, kw_only=True):
+    """State of the log; latched."""
+
+    state: Literal["idle", "recording", "closed", "error"]
+    path: str
+    messages: int
+    bytes: int
+    lost: int
+    reason: str

@@ -1,0 +1,36 @@
+"""Scenarios: what a trial is about, drawn from a seed or read from a file and checked."""
+
+from fras_common.scenario.generator import draw_scene, resolve
+from fras_common.scenario.geometry import attachment_raster, nodes_in_discs
+from fras_common.scenario.loader import ScenarioError, check, load, to_toml
+from fras_common.scenario.model import (
+    AwarenessSection,
+    Disc,
+    GeneratorSection,
+    MotionSection,
+    PlannerSection,
+    RunSection,
+    Scenario,
+    SceneSection,
+    TissueSection,
+)
+
+__all__ = [
+    "AwarenessSection",
+    "Disc",
+    "GeneratorSection",
+    "MotionSection",
+    "PlannerSection",
+    "RunSection",
+    "Scenario",
+    "ScenarioError",
+    "SceneSection",
+    "TissueSection",
+    "attachment_raster",
+    "check",
+    "draw_scene",
+    "load",
+    "nodes_in_discs",
+    "resolve",
+    "to_toml",
+]

@@ -1,0 +1,190 @@
+"""Scenario files: read, checked, written. An error names file, key, value and what is allowed."""
+
+import difflib
+import re
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, cast, get_args
+
+import msgspec
+import tomlkit
+
+from fras_common.errors import FrasError
+from fras_common.scenario.model import Scenario, Section
+
+_PATH = re.compile(r" - at `\$\.?(.*)`$")
+_UNKNOWN = re.compile(r"Object contains unknown field `(.*?)`")
+
+
+class ScenarioError(FrasError):
+    """A scenario that can't be run."""
+
+    def __init__(self, file: str, key: str, value: object, allowed: str) -> None:
+        super().__init__(
+            f"{file}: {key} = {value!r}: {allowed}",
+            file=file,
+            key=key,
+            value=value,
+            allowed=allowed,
+        )
+
+
+def load(path: Path) -> Scenario:
+    """Read and check a scenario file.
+
+    Raises
+    ------
+    ScenarioError
+        The file can't be read, is no TOML, or holds something that is not allowed.
+    """
+    try:
+        raw = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise ScenarioError(str(path), "file", str(path), f"cannot be read: {error}") from error
+    except (ValueError, RecursionError) as error:
+        # tomllib also lets through what int() says of too many digits, and nesting without end.
+        raise ScenarioError(str(path), "file", str(path), f"is not TOML: {error}") from error
+    return convert(raw, str(path))
+
+
+def convert(raw: Mapping[str, Any], file: str) -> Scenario:
+    """Turn the content of a file (or the command line's overrides) into a checked scenario."""
+    try:
+        scenario = msgspec.convert(raw, Scenario)
+    except msgspec.ValidationError as error:
+        raise _explain(error, raw, file) from error
+    return check(scenario, file)
+
+
+def check(scenario: Scenario, file: str = "scenario") -> Scenario:
+    """Check what one field alone can't tell, and return the scenario.
+
+    Raises
+    ------
+    ScenarioError
+        ROI outside the tissue, a disc off the tissue, inverted ranges, hard below soft limit, no
+        room for the ROI that the generator is to draw.
+    """
+    size, scene, awareness = scenario.tissue.size_m, scenario.scene, scenario.awareness
+    if scene is not None:
+        for axis, name in enumerate("xy"):
+            if not 0 <= scene.roi_m[axis] <= size[axis]:
+                raise ScenarioError(
+                    file, "scene.roi_m", list(scene.roi_m),
+                    f"{name} must lie on the tissue, between 0 and {size[axis]} m",
+                )  # fmt: skip
+        if not -0.01 < scene.roi_m[2] <= 0:
+            raise ScenarioError(
+                file, "scene.roi_m", list(scene.roi_m),
+                "z must lie under the tissue, above -0.01 m and at most 0",
+            )  # fmt: skip
+        for index, disc in enumerate(scene.discs):
+            if not (0 <= disc.center_m[0] <= size[0] and 0 <= disc.center_m[1] <= size[1]):
+                raise ScenarioError(
+                    file, f"scene.discs[{index}].center_m", list(disc.center_m),
+                    f"must lie on the tissue: x up to {size[0]} m, y up to {size[1]} m",
+                )  # fmt: skip
+    generator = scenario.generator
+    if generator.disc_radius_max_m < generator.disc_radius_min_m:
+        raise ScenarioError(
+            file, "generator.disc_radius_max_m", generator.disc_radius_max_m,
+            f"must be at least disc_radius_min_m = {generator.disc_radius_min_m}",
+        )  # fmt: skip
+    half = min(size[0], size[1]) / 2
+    if scene is None and generator.roi_edge_margin_m >= half:
+        raise ScenarioError(
+            file, "generator.roi_edge_margin_m", generator.roi_edge_margin_m,
+            f"must be below {half}, half the tissue's shorter side",
+        )  # fmt: skip
+    if awareness.hard_limit_n is not None and awareness.hard_limit_n < awareness.force_limit_n:
+        raise ScenarioError(
+            file, "awareness.hard_limit_n", awareness.hard_limit_n,
+            f"must be at least force_limit_n = {awareness.force_limit_n}",
+        )  # fmt: skip
+    motion = scenario.motion
+    fastest = 2 * motion.stop_deceleration_m_s2 * scenario.tissue.dt_s
+    for name in ("free_speed_m_s", "holding_speed_m_s"):
+        speed: float = getattr(motion, name)
+        # The margin is for rounding: 2 * 1.25 * 0.02 is a little less than 0.05.
+        if speed > fastest * (1 + 1e-9):
+            raise ScenarioError(
+                file, f"motion.{name}", speed,
+                f"a stop must end within two ticks: at most {fastest:.4g}, or raise "
+                "motion.stop_deceleration_m_s2",
+            )  # fmt: skip
+    return scenario
+
+
+def to_toml(scenario: Scenario) -> str:
+    """Write a scenario so that `load` gives the same one back."""
+    document = tomlkit.document()
+    for key, value in msgspec.to_builtins(scenario).items():
+        if value is not None:
+            document[key] = _without_none(value)
+    return tomlkit.dumps(document)
+
+
+def _without_none(value: object) -> object:
+    """TOML has no null: an absent key means the default, which is None wherever None is allowed."""
+    if isinstance(value, dict):
+        table = cast(dict[str, object], value)
+        return {key: _without_none(item) for key, item in table.items() if item is not None}
+    if isinstance(value, list | tuple):
+        return [_without_none(item) for item in cast(list[object], value)]
+    return value
+
+
+def _explain(error: msgspec.ValidationError, raw: Mapping[str, Any], file: str) -> ScenarioError:
+    text = str(error)
+    found = _PATH.search(text)
+    parent = found.group(1) if found else ""
+    problem = _PATH.sub("", text)
+    unknown = _UNKNOWN.match(problem)
+    if unknown is None:
+        if problem.startswith("Invalid enum value"):
+            problem = f"allowed: {', '.join(_choices_at(parent))}"
+        return ScenarioError(file, parent, _look_up(raw, parent), problem)
+    name = unknown.group(1)
+    known = _fields_at(parent)
+    close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+    hint = f"did you mean {close[0]}? " if close else ""
+    key = f"{parent}.{name}" if parent else name
+    return ScenarioError(
+        file, key, _look_up(raw, key), f"unknown key; {hint}known here: {', '.join(known)}"
+    )
+
+
+def _annotation_at(path: str) -> Any:
+    """Look up the declared type of the value at `path`."""
+    annotation: Any = Scenario
+    for part in filter(None, re.sub(r"\[.*?\]", "", path).split(".")):
+        fields = msgspec.structs.fields(_section_in(annotation))
+        annotation = next(field.type for field in fields if field.name == part)
+    return annotation
+
+
+def _fields_at(path: str) -> list[str]:
+    """Names that the table at `path` knows."""
+    return list(_section_in(_annotation_at(path)).__struct_fields__)
+
+
+def _choices_at(path: str) -> list[str]:
+    return [str(choice) for choice in get_args(_annotation_at(path))]
+
+
+def _section_in(annotation: Any) -> Any:
+    """Find the table's type inside Optional, tuple and the like."""
+    if isinstance(annotation, type) and issubclass(annotation, Section):
+        return annotation
+    return next(found for part in get_args(annotation) if (found := _section_in(part)))
+
+
+def _look_up(raw: Any, path: str) -> object:
+    for part in re.findall(r"[^.\[\]]+", path):
+        if isinstance(raw, list | tuple):
+            items = cast(list[object], raw)
+            raw = items[int(part)] if part.isdigit() and int(part) < len(items) else items
+        elif isinstance(raw, Mapping):
+            raw = cast(Mapping[str, object], raw).get(part)
+    return raw

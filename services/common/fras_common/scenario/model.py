@@ -1,0 +1,174 @@
+"""The scenario as types: every field, its unit in its name, its bounds in its type.
+
+The same types are the file format (TOML), the message format (a scenario travels by value in
+every reset) and the source of the reference page.
+"""
+
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta
+
+Force = Annotated[float, Meta(gt=0, le=1e6)]
+Distance = Annotated[float, Meta(ge=0, le=1.0)]
+Fraction = Annotated[float, Meta(ge=0, le=1)]
+Length = Annotated[float, Meta(gt=0, le=1.0)]
+Coordinate = Annotated[float, Meta(ge=-1.0, le=1.0)]
+NodeCount = Annotated[int, Meta(ge=2, le=200)]
+
+
+class Section(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Base of every table of the file: immutable, unknown keys refused."""
+
+
+class TissueSection(Section, frozen=True, kw_only=True):
+    """Geometry, mesh and mechanics of the tissue.
+
+    Attributes
+    ----------
+    size_m : (3,)
+        Extents along x, y, z; the box starts at the origin.
+    node_counts : (3,)
+        Nodes along x, y, z.
+    gravity, bed : bool
+        Weight, and the unilateral bed under the tissue.
+    """
+
+    size_m: tuple[Length, Length, Length] = (0.1, 0.12, 0.005)
+    node_counts: tuple[NodeCount, NodeCount, NodeCount] = (21, 25, 2)
+    young_modulus_pa: Annotated[float, Meta(gt=0, le=1e9)] = 3000.0
+    poisson_ratio: Annotated[float, Meta(ge=0, lt=0.5)] = 0.45
+    density_kg_m3: Annotated[float, Meta(gt=0, le=1e5)] = 950.0
+    dt_s: Annotated[float, Meta(ge=1e-4, le=0.1)] = 0.02
+    gravity: bool = False
+    bed: bool = True
+
+
+class Disc(Section, frozen=True, kw_only=True):
+    """An attachment patch on the bottom face."""
+
+    center_m: tuple[Coordinate, Coordinate]
+    radius_m: Distance
+
+
+class SceneSection(Section, frozen=True, kw_only=True):
+    """Where the region of interest (ROI) is and where the tissue is attached.
+
+    Attributes
+    ----------
+    redraws : int
+        How often the generator had to draw again before a ROI fitted.
+    """
+
+    roi_m: tuple[Coordinate, Coordinate, Coordinate]
+    discs: tuple[Disc, ...] = ()
+    redraws: Annotated[int, Meta(ge=0)] = 0
+
+
+class GeneratorSection(Section, frozen=True, kw_only=True):
+    """How a scene is drawn from the seed when the file gives none.
+
+    Attributes
+    ----------
+    disc_radius_min_m : float
+        At least 3 mm: a smaller disc may lie between the raster's points, and drawing never end.
+    """
+
+    attached_fraction: Fraction = 0.4
+    disc_radius_min_m: Annotated[float, Meta(ge=0.003, le=1.0)] = 0.02
+    disc_radius_max_m: Length = 0.04
+    roi_edge_margin_m: Distance = 0.015
+    clearance_m: Distance = 0.01
+    roi_depth_m: Annotated[float, Meta(ge=0, lt=0.01)] = 0.0
+
+
+class AwarenessSection(Section, frozen=True, kw_only=True):
+    """Thresholds of situation awareness; defaults are the paper's.
+
+    Attributes
+    ----------
+    force_limit_n : float
+        epsilon: a pull stops above it.
+    hard_limit_n : float or None
+        Every action stops above it; twice epsilon if absent.
+    no_limit : bool
+        Switch both limits off.
+    visible_fraction : float
+        delta: the ROI counts as visible above it.
+    blocks : int
+        N of the N x N candidate grasping points.
+    """
+
+    force_limit_n: Force = 0.5
+    hard_limit_n: Force | None = None
+    no_limit: bool = False
+    force_metric: Literal["nodal_max", "tool"] = "nodal_max"
+    visible_fraction: Fraction = 0.7
+    visible_distance_m: Length = 0.01
+    at_distance_m: Length = 0.005
+    closed_jaw_rad: Annotated[float, Meta(gt=-0.7, lt=1.4)] = 0.3490658503988659
+    blocks: Annotated[int, Meta(ge=1, le=40)] = 7
+
+
+class PlannerSection(Section, frozen=True, kw_only=True):
+    """What the planner prefers and when it gives up.
+
+    Attributes
+    ----------
+    ignore_ap : bool
+        The first plan grasps nearest the ROI, whatever holds the tissue there (scenario C).
+    goal : {"visible", "clear"}
+        `clear` also asks that no arm stands at its maximal height.
+    """
+
+    criterion: Literal["sum", "literal", "lex", "nearest", "weighted"] = "weighted"
+    goal: Literal["visible", "clear"] = "visible"
+    ignore_ap: bool = False
+    max_replans: Annotated[int, Meta(ge=0, le=100)] = 5
+
+
+class MotionSection(Section, frozen=True, kw_only=True):
+    """Speeds and limits of the arms."""
+
+    free_speed_m_s: Annotated[float, Meta(gt=0, le=0.5)] = 0.05
+    holding_speed_m_s: Annotated[float, Meta(gt=0, le=0.2)] = 0.02
+    acceleration_m_s2: Annotated[float, Meta(gt=0, le=5)] = 0.2
+    jerk_m_s3: Annotated[float, Meta(gt=0, le=1000)] = 4.0
+    stop_deceleration_m_s2: Annotated[float, Meta(gt=0, le=10)] = 1.25
+    jaw_speed_rad_s: Annotated[float, Meta(gt=0, le=18)] = 2.0
+    lift_height_m: Annotated[float, Meta(gt=0, le=0.06)] = 0.05
+    clearance_height_m: Annotated[float, Meta(gt=0, le=0.06)] = 0.03
+    retreat_max_m: Annotated[float, Meta(ge=0, le=0.02)] = 0.005
+    joint_time_constant_s: Annotated[float, Meta(ge=0, le=1)] = 0.01
+
+
+class RunSection(Section, frozen=True, kw_only=True):
+    """How the trial is run; nothing here changes its result.
+
+    Attributes
+    ----------
+    pace : float
+        Simulated seconds per wall second; 0 = as fast as possible.
+    peer_timeout_s : float
+        Motion aborts the trial when a peer has not answered for so long.
+    hold_timeout_s : float
+        A hold that nobody lifts ends the trial; 0 = it waits for ever.
+    """
+
+    pace: Annotated[float, Meta(ge=0, le=1000)] = 1.0
+    peer_timeout_s: Annotated[float, Meta(gt=0, le=600)] = 10.0
+    hold_timeout_s: Annotated[float, Meta(ge=0, le=86400)] = 30.0
+
+
+class Scenario(Section, frozen=True, kw_only=True):
+    """One trial: everything that decides its result, and how fast to run it."""
+
+    name: str = "default"
+    seed: Annotated[int, Meta(ge=0, lt=2**53)] = 0
+    tissue: TissueSection = TissueSection()
+    scene: SceneSection | None = None
+    generator: GeneratorSection = GeneratorSection()
+    awareness: AwarenessSection = AwarenessSection()
+    planner: PlannerSection = PlannerSection()
+    motion: MotionSection = MotionSection()
+    run: RunSection = RunSection()

@@ -1,0 +1,19 @@
+"""What this process costs."""
+
+import psutil
+
+
+class ProcessMeter:
+    """Resident memory and processor share of the process that makes it."""
+
+    def __init__(self) -> None:
+        self._process = psutil.Process()
+        self._process.cpu_percent()
+
+    def rss_bytes(self) -> int:
+        """Resident memory [bytes]."""
+        return int(self._process.memory_info().rss)
+
+    def cpu_percent(self) -> float:
+        """Processor share since the last call; 100 is one core."""
+        return float(self._process.cpu_percent())

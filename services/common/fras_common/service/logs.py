@@ -1,0 +1,62 @@
+"""Structured logs: one JSON line each on stderr, and from WARNING up a message on the bus."""
+
+import contextlib
+import io
+import logging
+import sys
+from collections.abc import Callable, Mapping, MutableMapping
+from typing import Any, TextIO, cast
+
+import structlog
+
+from fras_common.messages import LogRecord
+
+Emit = Callable[[LogRecord], None]
+
+
+class Stderr(io.TextIOBase):
+    """Standard error that outlives its reader: a supervisor's death must not stop a safe stop."""
+
+    def write(self, text: str, /) -> int:
+        """Write, unless nobody can read it any more."""
+        with contextlib.suppress(BrokenPipeError):
+            sys.stderr.write(text)
+        return len(text)
+
+    def flush(self) -> None:
+        """Flush, unless nobody can read it any more."""
+        with contextlib.suppress(BrokenPipeError):
+            sys.stderr.flush()
+
+
+def configure_logging(service: str, level: str, emit: Emit) -> structlog.stdlib.BoundLogger:
+    """Set structlog up for this process and return the service's logger.
+
+    Parameters
+    ----------
+    service : str
+    level : str
+        Name of the lowest level that is printed.
+    emit : callable
+        Gets each record from WARNING up, to be published on `log/<service>`.
+    """
+
+    def publish(_logger: Any, method: str, event: MutableMapping[str, Any]) -> Mapping[str, Any]:
+        if method in {"warning", "error", "critical"}:
+            fields = {key: str(value) for key, value in event.items() if key != "event"}
+            emit(LogRecord(level=method, event=str(event["event"]), fields=fields))
+        return event
+
+    structlog.configure(
+        processors=[
+            structlog.processors.add_log_level,
+            structlog.processors.format_exc_info,
+            publish,
+            structlog.processors.TimeStamper(fmt="iso", utc=True),
+            structlog.processors.JSONRenderer(sort_keys=False, default=str),
+        ],
+        wrapper_class=structlog.make_filtering_bound_logger(logging.getLevelNamesMapping()[level]),
+        logger_factory=structlog.PrintLoggerFactory(file=cast(TextIO, Stderr())),
+        cache_logger_on_first_use=False,
+    )
+    return structlog.get_logger(service=service)

@@ -1,0 +1,118 @@
+"""The main function of every service process."""
+
+import argparse
+import importlib
+import sys
+import threading
+import uuid
+from collections.abc import Callable
+from typing import Protocol
+
+from fras_common.bus import Bus
+from fras_common.bus.zenoh_bus import NoRouter, ZenohBus
+from fras_common.service.extras import MissingExtra, require_extra
+from fras_common.service.host import ServiceHost
+from fras_common.service.logs import configure_logging
+from fras_common.service.signals import StopFlag
+
+EXIT_START = 3
+
+
+class Service(Protocol):
+    """A shell: declares itself on the host, and does what is due by time."""
+
+    def wake(self) -> float | None:
+        """Do what is due; return the seconds until the next time, or None."""
+        ...
+
+    def close(self) -> None:
+        """Leave everything in order; the bus is still open."""
+        ...
+
+
+Build = Callable[[ServiceHost], Service]
+
+
+def parse_arguments(name: str, argv: list[str] | None, description: str) -> argparse.Namespace:
+    """Arguments that every service takes."""
+    parser = argparse.ArgumentParser(prog=f"fras {name}", description=description)
+    parser.add_argument("--cell", default="local", help="cell (Zenoh namespace fras/<cell>)")
+    parser.add_argument(
+        "--connect", default="tcp/127.0.0.1:7447", help="endpoint of the Zenoh router"
+    )
+    parser.add_argument("--instance", default="", help="name of this instance (default: random)")
+    parser.add_argument(
+        "--log-level", default="INFO", choices=["DEBUG", "INFO", "WARNING", "ERROR"]
+    )
+    return parser.parse_args(argv)
+
+
+def run_service(name: str, shell: str, argv: list[str] | None = None, description: str = "") -> int:
+    """Run a service until it is told to stop.
+
+    Parameters
+    ----------
+    name : str
+        Name in the topic table.
+    shell : str
+        `module:attribute` of what makes the shell on an attached host; imported here, so that
+        `--help` needs none of its libraries and a missing one is named.
+    argv : list of str, optional
+        Command line without the program's name.
+    description : str
+        First line of `--help`.
+
+    Returns
+    -------
+    int
+        Exit status: 0 after a stop, 3 if a library is missing or the router can't be reached.
+    """
+    options = parse_arguments(name, argv, description)
+    stop = StopFlag()
+    stop.install()
+    host = ServiceHost(name)
+    host.log = configure_logging(name, options.log_level, host.publish_log)
+    instance = options.instance or uuid.uuid4().hex[:4]
+    try:
+        with require_extra(name):
+            build = _load(shell)
+    except MissingExtra as error:
+        print(f"fras {name}: {error}", file=sys.stderr)
+        return EXIT_START
+    try:
+        bus = ZenohBus(
+            options.cell, options.connect, f"{name}/{instance}", on_malformed=host.count_malformed
+        )
+    except NoRouter as error:
+        print(f"fras {name}: {error}", file=sys.stderr)
+        return EXIT_START
+    try:
+        serve(host, bus, build, stop)
+    finally:
+        bus.close()
+    return 0
+
+
+def _load(shell: str) -> Build:
+    module, _, attribute = shell.partition(":")
+    return getattr(importlib.import_module(module), attribute)
+
+
+def serve(host: ServiceHost, bus: Bus, build: Build, stop: StopFlag) -> None:
+    """Attach, announce, and loop until `stop`."""
+    host.attach(bus)
+    service = build(host)
+    health_stop = threading.Event()
+    health = threading.Thread(
+        target=host.report_health, args=(health_stop,), name="health", daemon=True
+    )
+    health.start()
+    stop.on_set = host.stop
+    try:
+        host.announce_alive()
+        if not stop.is_set():
+            host.run(service.wake)
+    finally:
+        health_stop.set()
+        health.join()
+        service.close()

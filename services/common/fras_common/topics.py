@@ -1,0 +1,148 @@
+"""THE table: every key, its type, who produces it, how it travels.
+
+Publishers, subscribers, recorder, documentation and contract tests are all generated from it.
+A key may hold one placeholder, `{name}`, for a family of keys (`health/{service}`).
+"""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any, Generic, TypeVar
+
+from fras_common import messages as m
+
+M = TypeVar("M", bound=m.Header)
+Req = TypeVar("Req")
+Rep = TypeVar("Rep")
+
+
+class Qos(StrEnum):
+    """How a topic travels, and why.
+
+    STATE: reliable, dropped under congestion and then recovered from the publisher's cache;
+    never blocking, because one frozen subscriber would stop the loop for everyone.
+    EVENT: the same, and the last value is kept for whoever comes later (latched).
+    TELEMETRY: best effort; the next one replaces a lost one.
+    """
+
+    STATE = "state"
+    EVENT = "event"
+    TELEMETRY = "telemetry"
+
+
+@dataclass(frozen=True)
+class Topic(Generic[M]):
+    """One published key.
+
+    Attributes
+    ----------
+    in_trial : bool
+        Belongs to a trial: a service drops and counts it outside the trial of its last reset.
+    """
+
+    key: str
+    type: type[M]
+    producer: str
+    qos: Qos
+    when: str
+    in_trial: bool = True
+
+    def of(self, **names: str) -> "Topic[M]":
+        """Fill the placeholder: `HEALTH.of(service="sim")`."""
+        return Topic(
+            self.key.format(**names), self.type, self.producer, self.qos, self.when, self.in_trial
+        )
+
+    @property
+    def wildcard(self) -> str:
+        """Key expression that matches the whole family."""
+        head, brace, _ = self.key.partition("{")
+        return f"{head}**" if brace else self.key
+
+
+@dataclass(frozen=True)
+class Query(Generic[Req, Rep]):
+    """One question that one service answers; mirrored on `rpc/<server>/<name>`."""
+
+    key: str
+    request: type[Req]
+    reply: type[Rep]
+    server: str
+
+    @property
+    def mirror(self) -> str:
+        """Key of the mirror."""
+        return f"rpc/{self.server}/{self.key.partition('/')[2]}"
+
+
+TISSUE_MODEL = Topic("sim/tissue_model", m.TissueModel, "sim", Qos.EVENT, "each reset")
+TISSUE_STATE = Topic("sim/tissue_state", m.TissueState, "sim", Qos.STATE, "each tick")
+ROBOT_STATE = Topic("robot/state", m.RobotState, "motion", Qos.STATE, "each tick")
+VERDICT = Topic("sa/verdict", m.Verdict, "sa", Qos.STATE, "each tick")
+CONTEXT = Topic("sa/context", m.Context, "sa", Qos.EVENT, "on request")
+PLAN = Topic("planner/plan", m.Plan, "planner", Qos.EVENT, "each plan")
+TASK_STATUS = Topic(
+    "planner/task_status", m.TaskStatus, "planner", Qos.EVENT, "each change", in_trial=False
+)
+ACTION_RESULT = Topic(
+    "motion/action_result", m.ActionResult, "motion", Qos.EVENT, "end of each action"
+)
+RECORDER_STATUS = Topic(
+    "recorder/status", m.RecorderStatus, "recorder", Qos.EVENT, "each change", in_trial=False
+)
+HEALTH = Topic("health/{service}", m.Health, "*", Qos.TELEMETRY, "2 Hz", in_trial=False)
+LOG = Topic("log/{service}", m.LogRecord, "*", Qos.STATE, "from WARNING up", in_trial=False)
+RPC = Topic("rpc/{service}/{name}", m.RpcRecord, "*", Qos.STATE, "each query", in_trial=False)
+
+TOPICS: tuple[Topic[Any], ...] = (
+    TISSUE_MODEL,
+    TISSUE_STATE,
+    ROBOT_STATE,
+    VERDICT,
+    CONTEXT,
+    PLAN,
+    TASK_STATUS,
+    ACTION_RESULT,
+    RECORDER_STATUS,
+    HEALTH,
+    LOG,
+    RPC,
+)
+
+TASK = Query("planner/task", m.TaskRequest, m.TaskReply, "planner")
+EXECUTE = Query("motion/execute", m.ExecuteRequest, m.ExecuteReply, "motion")
+HOLD = Query("motion/hold", m.HoldRequest, m.HoldState, "motion")
+RESUME = Query("motion/resume", m.ResumeRequest, m.HoldState, "motion")
+MOTION_RESET = Query("motion/reset", m.ResetRequest, m.ResetReply, "motion")
+SIM_RESET = Query("sim/reset", m.ResetRequest, m.ResetReply, "sim")
+SA_RESET = Query("sa/reset", m.ResetRequest, m.ResetReply, "sa")
+SA_CONTEXT = Query("sa/context", m.ContextRequest, m.Context, "sa")
+SA_TARGET = Query("sa/target", m.TargetRequest, m.TargetReply, "sa")
+RECORDER_OPEN = Query("recorder/open", m.OpenRequest, m.ResetReply, "recorder")
+RECORDER_CLOSE = Query("recorder/close", m.CloseRequest, m.CloseReply, "recorder")
+
+QUERIES: tuple[Query[Any, Any], ...] = (
+    TASK,
+    EXECUTE,
+    HOLD,
+    RESUME,
+    MOTION_RESET,
+    SIM_RESET,
+    SA_RESET,
+    SA_CONTEXT,
+    SA_TARGET,
+    RECORDER_OPEN,
+    RECORDER_CLOSE,
+)
+
+SERVICES: tuple[str, ...] = ("sim", "sa", "planner", "motion", "recorder")
+
+
+def topic_of(key: str) -> Topic[Any] | None:
+    """Find the table's row for a concrete key, or None for a key that is not in the table."""
+    for topic in TOPICS:
+        if topic.key == key:
+            return topic
+        head, brace, _ = topic.key.partition("{")
+        if brace and key.startswith(head):
+            return topic
+    return None

@@ -1,0 +1,190 @@
+"""What only a wire can do: freeze, break, come back."""
+
+import signal
+import subprocess
+import sys
+import threading
+import time
+import uuid
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from fras_common.bus import BusClosed
+from fras_common.bus.zenoh_bus import NoRouter, ZenohBus, route
+from fras_common.messages import LogRecord, RecorderStatus
+from fras_common.topics import LOG, RECORDER_STATUS
+
+Listen = Callable[[], Any]
+
+SIM_LOG = LOG.of(service="sim")
+BIG = "x" * 40_000
+FROZEN_PUTS = 400
+
+LISTENER = """
+import sys, threading
+from fras_common.bus.zenoh_bus import ZenohBus
+from fras_common.topics import LOG
+expected, done, seqs = int(sys.argv[3]), threading.Event(), []
+def on_log(message):
+    seqs.append(message.seq)
+    if message.event == "warm-up" and len(seqs) == 1:
+        print("hearing", flush=True)
+    if message.event == "last":
+        done.set()
+bus = ZenohBus(sys.argv[1], sys.argv[2], "sa/frozen")
+bus.subscribe(LOG.of(service="sim"), on_log)
+print("subscribed", flush=True)
+done.wait(60)
+print(seqs == list(range(seqs[0], seqs[0] + len(seqs))), seqs[-1], flush=True)
+bus.close()
+"""
+
+
+@pytest.fixture
+def listener(router: Any) -> Iterator[tuple[str, subprocess.Popen[str]]]:
+    cell = f"frozen-{uuid.uuid4().hex[:6]}"
+    process = subprocess.Popen(
+        [sys.executable, "-c", LISTENER, cell, router.endpoint, str(FROZEN_PUTS)],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None
+    with process:
+        assert process.stdout.readline() == "subscribed\n"
+        yield cell, process
+        process.kill()
+
+
+def line_of(process: subprocess.Popen[str]) -> list[str]:
+    lines: list[str] = []
+    assert process.stdout is not None
+    reader = threading.Thread(
+        target=lambda out: lines.append(out.readline()), args=(process.stdout,)
+    )
+    reader.start()
+    return lines
+
+
+def test_a_frozen_subscriber_blocks_nobody_and_misses_nothing(
+    router: Any, listener: tuple[str, subprocess.Popen[str]], listen: Listen
+):
+    cell, process = listener
+    heard = listen()
+    publishing = ZenohBus(cell, router.endpoint, "sim/1")
+    hearing = ZenohBus(cell, router.endpoint, "cli/1")
+    try:
+        hearing.subscribe(SIM_LOG, heard)
+        publisher = publishing.publisher(SIM_LOG)
+        said = line_of(process)
+        deadline = time.monotonic() + 20.0
+        while not (said and heard) and time.monotonic() < deadline:
+            before = len(heard)
+            publisher.put(LogRecord(level="", event="warm-up", fields={}))
+            try:
+                heard.until(lambda got, before=before: len(got) > before, timeout_s=0.05)
+            except AssertionError:
+                continue
+        assert said == ["hearing\n"]
+
+        process.send_signal(signal.SIGSTOP)
+        worst = 0.0
+        for _ in range(FROZEN_PUTS):
+            since = time.monotonic()
+            publisher.put(LogRecord(level="", event="big", fields={"data": BIG}))
+            worst = max(worst, time.monotonic() - since)
+        last = publisher.put(LogRecord(level="", event="last", fields={}))
+        heard.until(lambda got: got[-1].event == "last", timeout_s=30.0)
+        process.send_signal(signal.SIGCONT)
+
+        assert worst < 1.0, "a put waited for a subscriber"
+        out, _ = process.communicate(timeout=60)
+        assert out == f"True {last.seq}\n", "the frozen subscriber missed something"
+    finally:
+        process.send_signal(signal.SIGCONT)
+        hearing.close()
+        publishing.close()
+
+
+def test_after_a_router_restart_nothing_the_cache_holds_is_lost(own_router: Any, listen: Listen):
+    heard, raw, tokens = listen(), listen(), listen()
+    publishing = ZenohBus("one", own_router.endpoint, "sim/1")
+    hearing = ZenohBus("one", own_router.endpoint, "sa/1")
+    try:
+        hearing.subscribe(SIM_LOG, heard)
+        hearing.subscribe_raw("**", raw)
+        hearing.watch_tokens(tokens)
+        publishing.announce("alive/sim")
+        tokens.count(1)
+        publisher = publishing.publisher(SIM_LOG)
+        while not heard:
+            publisher.put(LogRecord(level="", event="warm-up", fields={}))
+            try:
+                heard.until(bool, timeout_s=0.05)
+            except AssertionError:
+                continue
+        own_router.stop()
+        for _ in range(200):
+            publisher.put(LogRecord(level="", event="away", fields={}))
+        own_router.start()
+        last = publisher.put(LogRecord(level="", event="back", fields={}))
+
+        got = heard.until(lambda got: got[-1].seq == last.seq, timeout_s=30.0)
+        assert [m.seq for m in got] == list(range(got[0].seq, last.seq + 1))
+        raw.until(lambda got: len(got) == last.seq + 1, timeout_s=30.0)
+        tokens.until(lambda got: got[-1] == ("alive/sim/1", True))
+    finally:
+        hearing.close()
+        publishing.close()
+
+
+def test_a_latched_value_is_told_after_a_router_restart(own_router: Any, listen: Listen):
+    heard = listen()
+    publishing = ZenohBus("one", own_router.endpoint, "recorder/1")
+    try:
+        publisher = publishing.publisher(RECORDER_STATUS)
+        publisher.put(
+            RecorderStatus(state="idle", path="", messages=0, bytes=0, lost=0, reason="kept")
+        )
+        own_router.stop()
+        own_router.start()
+        late = ZenohBus("one", own_router.endpoint, "cli/1")
+        try:
+            late.subscribe(RECORDER_STATUS, heard)
+            assert heard.count(1)[0].reason == "kept"
+        finally:
+            late.close()
+    finally:
+        publishing.close()
+
+
+def test_a_bus_closes_when_its_router_is_gone(own_router: Any):
+    bus = ZenohBus("one", own_router.endpoint, "sim/1")
+    publisher = bus.publisher(SIM_LOG)
+    bus.subscribe(SIM_LOG, print)
+    bus.announce("alive/sim")
+    own_router.stop()
+    bus.close()
+    with pytest.raises(BusClosed):
+        publisher.put(LogRecord(level="", event="late", fields={}))
+
+
+def test_without_a_router_the_bus_says_what_to_do(own_router: Any):
+    own_router.stop()
+    with pytest.raises(NoRouter, match="fras up") as caught:
+        ZenohBus("one", own_router.endpoint, "sim/1", open_timeout_s=0.2)
+    assert caught.value.values == {"connect": own_router.endpoint}
+
+
+@pytest.mark.parametrize("endpoint", ["nonsense", "tcp/nowhere.invalid:1", "carrier/pigeon:1"])
+def test_an_impossible_endpoint_is_no_router(endpoint: str):
+    with pytest.raises(NoRouter):
+        ZenohBus("one", endpoint, "sim/1", open_timeout_s=0.2)
+    with pytest.raises(NoRouter):
+        route(endpoint, until=lambda: None)
+
+
+def test_a_taken_port_is_named(router: Any):
+    with pytest.raises(NoRouter, match="cannot listen on"):
+        route(router.endpoint, until=lambda: None)

@@ -1,0 +1,83 @@
+"""A scenario is file format and message at once: nothing may be lost on either way."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from fras_common.codec import decode, encode
+from fras_common.scenario import Scenario, SceneSection, check, load, resolve, to_toml
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("scenario") / "scenario.toml"
+
+
+def made_possible(scenario: Scenario) -> Scenario:
+    """The same scenario with its fields brought into agreement."""
+    replace = msgspec.structs.replace
+    generator, awareness, scene = scenario.generator, scenario.awareness, scenario.scene
+    x, y, z = (max(0.001, extent) for extent in scenario.tissue.size_m)
+    tissue = replace(scenario.tissue, size_m=(x, y, z))
+    if scene is not None:
+        (u, v, w), discs = scene.roi_m, scene.discs
+        scene = SceneSection(
+            roi_m=(abs(u) * x, abs(v) * y, -abs(w) * 0.009),
+            discs=tuple(
+                replace(d, center_m=(abs(d.center_m[0]) * x, abs(d.center_m[1]) * y)) for d in discs
+            ),
+            redraws=scene.redraws,
+        )
+    radii = sorted([generator.disc_radius_min_m, generator.disc_radius_max_m])
+    generator = replace(
+        generator,
+        disc_radius_min_m=max(0.003, radii[0]),
+        disc_radius_max_m=max(0.003, radii[1]),
+        roi_edge_margin_m=min(generator.roi_edge_margin_m, 0.4 * min(x, y)),
+    )
+    if awareness.hard_limit_n is not None:
+        limits = sorted([awareness.force_limit_n, awareness.hard_limit_n])
+        awareness = replace(awareness, force_limit_n=limits[0], hard_limit_n=limits[1])
+    motion, deceleration = scenario.motion, max(0.1, scenario.motion.stop_deceleration_m_s2)
+    fastest = 2 * deceleration * scenario.tissue.dt_s
+    motion = replace(
+        motion,
+        stop_deceleration_m_s2=deceleration,
+        free_speed_m_s=min(motion.free_speed_m_s, fastest),
+        holding_speed_m_s=min(motion.holding_speed_m_s, fastest),
+    )
+    return check(
+        replace(
+            scenario,
+            tissue=tissue,
+            scene=scene,
+            generator=generator,
+            awareness=awareness,
+            motion=motion,
+        )
+    )
+
+
+def test_any_valid_scenario_survives_its_file(
+    file: Path, instances: Callable[[type[Any]], st.SearchStrategy[Any]]
+):
+    @given(scenario=instances(Scenario).map(made_possible))
+    @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+    def run(scenario: Scenario):
+        file.write_text(to_toml(scenario), encoding="utf-8")
+        assert load(file) == scenario
+        assert decode(Scenario, encode(scenario), "") == scenario
+
+    run()
+
+
+def test_a_drawn_scene_survives_its_file_bit_for_bit(file: Path):
+    for seed in range(10):
+        scenario = resolve(Scenario(name=f"drawn {seed}", seed=seed))
+        file.write_text(to_toml(scenario), encoding="utf-8")
+        assert load(file) == scenario
