@@ -1,0 +1,16 @@
+"""`python -m fras_sim`."""
+
+import sys
+
+from fras_common.service import run_service
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the service."""
+    return run_service(
+        "sim", "fras_sim.service:SimService", argv, "Simulate the tissue with finite elements."
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

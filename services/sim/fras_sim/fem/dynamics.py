@@ -1,0 +1,270 @@
+"""One implicit Euler step as the minimisation of an energy."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fras_sim.fem import kernels
+from fras_sim.fem.assembly import ElasticBody, with_identity_rows
+from fras_sim.fem.contact import bed_stiffness, penetrating
+from fras_sim.fem.errors import FactorizationFailed
+from fras_sim.fem.lbfgs import LbfgsMemory
+from fras_sim.fem.linear_solver import LinearSolver
+from fras_sim.fem.parameters import SolverOptions, TissueParameters
+
+STANDARD_GRAVITY_M_S2 = 9.80665
+ARMIJO = 1e-4
+MAX_HALVINGS = 12
+# Two energies that differ by less than this share, or by less than this share of the work of the
+# tolerated force over the tolerated step, are the same number but for rounding.
+ENERGY_ROUNDING = 1e-13
+WORK_ROUNDING = 1e-6
+# Steps below this share of the tolerance teach L-BFGS nothing but rounding.
+STEP_ROUNDING = 1e-3
+# A held node this close to where it must be is there.
+LEAD_ROUNDING_M = 1e-12
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Positions [m], velocities [m/s], both (n_nodes, 3), and the strain they imply."""
+
+    x: Array
+    v: Array
+    strain: Array
+
+
+@dataclass(frozen=True, eq=False)
+class StepSolution:
+    """What the minimisation found.
+
+    ``gradient`` (n_nodes, 3) [N] is that of the whole energy: zero, up to ``residual_n``, at the
+    free nodes; at a fixed or held node the force that its support exerts on the tissue.
+    """
+
+    x: Array
+    gradient: Array
+    iterations: int
+    residual_n: float
+    refactored: bool
+    converged: bool
+
+
+@dataclass(frozen=True, eq=False)
+class _Step:
+    """Where one step starts and where inertia and weight alone would take it."""
+
+    before: Motion
+    target: Array
+
+
+class ImplicitEuler:
+    """Minimises, over the free nodes, the energy of one step.
+
+    Parameters
+    ----------
+    body : ElasticBody
+    parameters : TissueParameters
+    solver : LinearSolver
+        For the pattern of `body`.
+    options : SolverOptions
+
+    Notes
+    -----
+    With mass M (lumped), drag alpha and step h the new positions minimise ::
+
+        1/2 |x - y|²_D + W(x) + viscosity(x; E_n) + sum k/2 min(z, 0)²
+        D = M (1/h² + alpha/h),   y = x_n + (h v_n + h² g) / (1 + alpha h)
+
+    whose gradient is the implicit Euler equation (Martin et al., *Example-based elastic
+    materials*, 2011, section 4; Liu et al., *Quasi-Newton methods for real-time simulation of
+    hyperelastic materials*, 2017, for L-BFGS on top of a factored Hessian). The factor is that of
+    an earlier step's projected Hessian: L-BFGS makes up for what has changed since. The memory of
+    L-BFGS and the factor outlive a step; `forget` clears both.
+    """
+
+    def __init__(
+        self,
+        body: ElasticBody,
+        parameters: TissueParameters,
+        solver: LinearSolver,
+        options: SolverOptions,
+    ) -> None:
+        h = parameters.dt_s
+        n_nodes = len(body.mesh.nodes_m)
+        self.mass_kg = parameters.density_kg_m3 * body.nodal_volume_m3
+        self._body = body
+        self._solver = solver
+        self._options = options
+        self._dt_s = h
+        self._drag = 1.0 + parameters.mass_damping_per_s * h
+        self._inertia = self.mass_kg * self._drag / h**2
+        self._fall = np.array([0.0, 0.0, -STANDARD_GRAVITY_M_S2 * h**2])
+        self._fall *= 1.0 if parameters.gravity else 0.0
+        self._ratio = parameters.stiffness_damping_s / h
+        self._bed = (
+            bed_stiffness(body.mesh, parameters.bed_stiffness_pa_m)
+            if parameters.bed
+            else np.zeros(n_nodes)
+        )
+        self._memory = LbfgsMemory(options.history)
+        self._hessian = np.zeros(0)
+        self._held_rows = np.zeros(0, dtype=np.int32)
+        self._factor_age: int | None = None
+
+    def forget(self) -> None:
+        """Drop the factor and the memory: the next step depends on its arguments alone."""
+        self._factor_age = None
+        self._memory.clear()
+
+    def step(self, before: Motion, held: NDArray[np.int32], held_at_m: Array) -> StepSolution:
+        """Return the positions one time step later.
+
+        Parameters
+        ----------
+        before : Motion
+        held : ndarray of int32
+            Nodes that are led; none of them fixed.
+        held_at_m : ndarray, shape (len(held), 3) [m]
+            Where they are led to.
+
+        Notes
+        -----
+        The first guess goes on at the old velocity; where the held nodes don't, the others take
+        the linear answer to the difference. A matrix that can't be factored ends the step as not
+        converged.
+        """
+        self._hold(held)
+        problem = _Step(before, before.x + (self._dt_s * before.v + self._fall) / self._drag)
+        x = before.x + self._dt_s * before.v
+        lead = held_at_m - x[held]
+        stale = self._factor_age is None or self._factor_age >= self._options.refactor_every
+        try:
+            if stale:
+                self._refactor(before.x, problem)
+            if np.abs(lead).max(initial=0.0) > LEAD_ROUNDING_M:
+                x = self._predict(x, problem, lead)
+            x[held] = held_at_m
+            solution = self._minimise(x, problem, refactored=stale)
+        except FactorizationFailed:
+            self.forget()
+            _, gradient = self._energy(before.x, problem)
+            residual = _largest(self._reduced(gradient))
+            return StepSolution(before.x, gradient, 0, residual, refactored=True, converged=False)
+        slow = solution.iterations >= self._options.slow_iterations
+        self._factor_age = None if slow or self._factor_age is None else self._factor_age + 1
+        return solution
+
+    def potential_energy_j(self, x: Array) -> float:
+        """Return elastic energy, that of the bed and that of the weight, the last from z = 0."""
+        energy = self._body.energy_gradient(x, np.zeros_like(x))
+        energy += 0.5 * float(self._bed @ np.minimum(x[:, 2], 0.0) ** 2)
+        return energy - float(self.mass_kg @ (x @ self._fall)) / self._dt_s**2
+
+    def _hold(self, held: NDArray[np.int32]) -> None:
+        rows = self._body.pattern.row_of[held].ravel()
+        if not np.array_equal(rows, self._held_rows):
+            self._held_rows = rows
+            self.forget()
+
+    def _energy(self, x: Array, problem: _Step) -> tuple[float, Array]:
+        gradient = np.zeros_like(x)
+        energy = self._body.energy_gradient(x, gradient, self._ratio, problem.before.strain)
+        energy += kernels.nodal_terms(x, problem.target, self._inertia, self._bed, gradient)
+        return energy, gradient
+
+    def _reduced(self, gradient: Array) -> Array:
+        reduced = gradient.ravel()[self._body.pattern.free]
+        reduced[self._held_rows] = 0.0
+        return reduced
+
+    def _expanded(self, reduced: Array, like: Array) -> Array:
+        full = np.zeros(like.size)
+        full[self._body.pattern.free] = reduced
+        return full.reshape(like.shape)
+
+    def _refactor(self, x: Array, problem: _Step) -> None:
+        pattern = self._body.pattern
+        self._hessian = self._body.hessian(x, self._ratio, problem.before.strain)
+        diagonal = np.repeat(self._inertia, 3).reshape(-1, 3)
+        diagonal[:, 2] += np.where(penetrating(x), self._bed, 0.0)
+        self._hessian[pattern.diagonal] += diagonal.ravel()[pattern.free]
+        self._solver.factorize(with_identity_rows(pattern, self._hessian, self._held_rows))
+        self._memory.clear()
+        self._factor_age = 0
+
+    def _predict(self, x: Array, problem: _Step, lead: Array) -> Array:
+        """Lead the held nodes to where they must be, the others by the linear answer to it."""
+        pattern = self._body.pattern
+        moved = np.zeros(pattern.n)
+        moved[self._held_rows] = lead.ravel()
+        _, gradient = self._energy(x, problem)
+        pull = kernels.symmetric_product(pattern.indptr, pattern.indices, self._hessian, moved)
+        pull[self._held_rows] = 0.0
+        answer = self._solver.solve(-self._reduced(gradient) - pull)
+        answer[self._held_rows] = lead.ravel()
+        return x + self._expanded(answer, x)
+
+    def _minimise(self, x: Array, problem: _Step, *, refactored: bool) -> StepSolution:
+        options = self._options
+        energy, gradient = self._energy(x, problem)
+        reduced = self._reduced(gradient)
+        iteration = 0
+        converged = False
+        exact = refactored
+        while not converged and iteration < options.max_iterations:
+            iteration += 1
+            if iteration % options.refactor_within == 0:
+                self._refactor(x, problem)
+                refactored = exact = True
+            direction = self._direction(reduced)
+            found = self._search(x, direction, energy, float(direction @ reduced), problem)
+            if found is None:
+                if exact:
+                    break
+                self._refactor(x, problem)
+                refactored = exact = True
+                continue
+            exact = False
+            length, x, energy, gradient = found
+            reduced_before, reduced = reduced, self._reduced(gradient)
+            moved_m = length * _largest(direction)
+            if moved_m > STEP_ROUNDING * options.step_tolerance_m:
+                self._memory.add(length * direction, reduced - reduced_before)
+            converged = (
+                length == 1.0
+                and moved_m <= options.step_tolerance_m
+                and _largest(reduced) <= options.residual_tolerance_n
+            )
+        return StepSolution(x, gradient, iteration, _largest(reduced), refactored, converged)
+
+    def _direction(self, reduced: Array) -> Array:
+        direction = self._memory.direction(reduced, self._solver.solve)
+        if direction @ reduced > 0.0:
+            self._memory.clear()
+            direction = -self._solver.solve(reduced)
+        return direction
+
+    def _search(
+        self, x: Array, direction: Array, energy: float, slope: float, problem: _Step
+    ) -> tuple[float, Array, float, Array] | None:
+        """Halve the step until Armijo's condition holds for the exact energy."""
+        full = self._expanded(direction, x)
+        options = self._options
+        work_j = options.step_tolerance_m * options.residual_tolerance_n
+        allowed = energy + ENERGY_ROUNDING * abs(energy) + WORK_ROUNDING * work_j
+        length = 1.0
+        for _ in range(MAX_HALVINGS):
+            x_new = x + length * full
+            energy_new, gradient_new = self._energy(x_new, problem)
+            if energy_new <= allowed + ARMIJO * length * slope:
+                return length, x_new, energy_new, gradient_new
+            length *= 0.5
+        return None
+
+
+def _largest(values: Array) -> float:
+    return float(np.abs(values).max(initial=0.0))

@@ -1,0 +1,100 @@
+"""What a tissue is made of and how its motion is computed."""
+
+import math
+from dataclasses import dataclass
+
+from fras_sim.fem.element import ElementKind
+from fras_sim.fem.errors import BadParameter
+from fras_sim.fem.material import lame_parameters
+
+
+@dataclass(frozen=True)
+class TissueParameters:
+    """Material, surroundings and time step.
+
+    Parameters
+    ----------
+    young_modulus_pa, poisson_ratio, density_kg_m3 : float
+    dt_s : float
+        Time step [s].
+    mass_damping_per_s : float
+        Rayleigh's alpha [1/s]: force ``-alpha M v``, the drag of the surroundings.
+    stiffness_damping_s : float
+        Rayleigh's beta [s]: the viscosity of the tissue (`assembly.ElasticBody`).
+    gravity : bool
+        Whether the tissue weighs anything.
+    bed : bool
+        Whether the plane z = 0 carries it.
+    bed_stiffness_pa_m : float
+        Pressure of the bed for each metre of depth [Pa/m]. The default is that of 1 cm of the same
+        tissue; a tenfold one doubles the iterations, as nodes touch down and lift off.
+    element : {"hex8-sri", "hex8"}
+
+    Raises
+    ------
+    BadParameter
+        Naming the first value that the equations don't allow.
+    """
+
+    young_modulus_pa: float = 3000.0
+    poisson_ratio: float = 0.45
+    density_kg_m3: float = 950.0
+    dt_s: float = 0.02
+    mass_damping_per_s: float = 2.0
+    stiffness_damping_s: float = 0.01
+    gravity: bool = False
+    bed: bool = True
+    bed_stiffness_pa_m: float = 3e5
+    element: ElementKind = "hex8-sri"
+
+    def __post_init__(self) -> None:
+        lame_parameters(self.young_modulus_pa, self.poisson_ratio)
+        for name in ("density_kg_m3", "dt_s", "bed_stiffness_pa_m"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0.0):
+                raise BadParameter(name, value, "a positive number")
+        for name in ("mass_damping_per_s", "stiffness_damping_s"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise BadParameter(name, value, "zero or a positive number")
+
+
+@dataclass(frozen=True)
+class SolverOptions:
+    """When a step counts as solved, and what is tried until it is.
+
+    Parameters
+    ----------
+    step_tolerance_m : float
+        A step is solved when its last full correction moved no node further than this [m].
+    residual_tolerance_n : float
+        ... and no free node is left with a larger force out of balance [N].
+    history : int
+        Pairs that L-BFGS remembers.
+    max_iterations : int
+        Corrections before a step is given up.
+    refactor_every : int
+        Steps that one factor serves at most.
+    refactor_within : int
+        Corrections in one step after which the factor is renewed, and L-BFGS with it.
+    slow_iterations : int
+        A step that needed this many corrections has the next one start with a fresh factor.
+    """
+
+    step_tolerance_m: float = 3e-6
+    residual_tolerance_n: float = 1e-3
+    history: int = 6
+    max_iterations: int = 60
+    refactor_every: int = 10
+    refactor_within: int = 10
+    slow_iterations: int = 6
+
+    def __post_init__(self) -> None:
+        for name in ("step_tolerance_m", "residual_tolerance_n"):
+            value = getattr(self, name)
+            if not value > 0.0:
+                raise BadParameter(name, value, "a positive number")
+        for name in ("history", "max_iterations", "refactor_every", "refactor_within"):
+            value = getattr(self, name)
+            if value < 1:
+                raise BadParameter(name, value, "1 or more")

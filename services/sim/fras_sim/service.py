@@ -1,0 +1,75 @@
+"""The simulator's shell: one robot state in, one step, one tissue state out."""
+
+import time
+
+from fras_common.codec import content_digest
+from fras_common.messages import ResetReply, ResetRequest, RobotState, TissueState
+from fras_common.service import ServiceHost
+from fras_common.topics import ROBOT_STATE, SIM_RESET, TISSUE_MODEL, TISSUE_STATE
+from fras_sim.adapter import build_simulator, tissue_model, tissue_state, tools_of
+from fras_sim.fem import BadToolInput, TissueSimulator, compile_kernels
+
+
+class SimService:
+    """Follows the robot tick by tick; logical time, no clock of its own."""
+
+    def __init__(self, host: ServiceHost) -> None:
+        self._host = host
+        self._simulator: TissueSimulator | None = None
+        self._last: TissueState | None = None
+        began_s = time.perf_counter()
+        compile_kernels()
+        host.log.info("kernels loaded", took_s=round(time.perf_counter() - began_s, 3))
+        self._model = host.publisher(TISSUE_MODEL)
+        self._state = host.publisher(TISSUE_STATE)
+        host.subscribe(ROBOT_STATE, self._on_robot)
+        host.serve(SIM_RESET, self._reset)
+
+    def _reset(self, request: ResetRequest) -> ResetReply:
+        self._simulator = build_simulator(request.scenario)
+        self._last = None
+        self._host.facts["linear_solver"] = self._simulator.solver_name
+        self._model.put(tissue_model(self._simulator, request.scenario, request.trial))
+        self._host.enter_trial(request.trial)
+        return ResetReply(digest=content_digest(request.trial, request.scenario, request.mesh))
+
+    def _on_robot(self, robot: RobotState) -> None:
+        simulator, last = self._simulator, self._last
+        if simulator is None:
+            return
+        reached = last.tick if last is not None else -1
+        if last is not None and robot.tick == reached:
+            # Asked again for the same tick: the same answer again.
+            self._state.put(last)
+        elif robot.tick != reached + 1:
+            self._host.counts["gaps"] += 1
+            self._host.log.warning("tick out of order, not stepped", tick=robot.tick, at=reached)
+        else:
+            self._advance(simulator, robot)
+
+    def _advance(self, simulator: TissueSimulator, robot: RobotState) -> None:
+        began_s = time.perf_counter()
+        tools = tools_of(robot)
+        try:
+            result = simulator.step(tools) if robot.tick > 0 else simulator.measure(tools)
+        except BadToolInput as error:
+            self._host.log.error("tool pose refused, tissue unchanged", problem=str(error))
+            return
+        wall_s = time.perf_counter() - began_s
+        if not result.solver.converged:
+            self._host.log.error(
+                "step not converged, state kept",
+                tick=robot.tick,
+                iterations=result.solver.iterations,
+                residual=result.solver.residual,
+            )
+        self._last = tissue_state(result, robot.tick, robot.trial, wall_s)
+        self._host.tick = robot.tick
+        self._state.put(self._last)
+
+    def wake(self) -> float | None:
+        """Nothing is due by time: the robot is the clock."""
+        return None
+
+    def close(self) -> None:
+        """Nothing to put in order."""
