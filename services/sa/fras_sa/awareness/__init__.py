@@ -1,0 +1,59 @@
+"""Situation awareness: fluents, force and visibility, from arrays alone.
+
+The paper's Algorithms 1 and 2 (situation awareness, compute_fluents) as pure functions: no bus,
+no message, no clock, no file. `Awareness` is the way in.
+"""
+
+from .awareness import Awareness, ContextView, Judgement
+from .blocks import Blocks, make_blocks
+from .errors import (
+    AwarenessError,
+    BadParameter,
+    MalformedModel,
+    NoBlocks,
+    NoTissueNearRoi,
+    UnknownName,
+    UnusableState,
+)
+from .memory import Memory
+from .parameters import AwarenessParameters
+from .views import (
+    ACTIONS,
+    ARMS,
+    ActionView,
+    ArmView,
+    Evidence,
+    Level,
+    RobotView,
+    TissueModel,
+    TissueView,
+)
+from .visibility import ClosePoints, make_close_points
+
+__all__ = [
+    "ACTIONS",
+    "ARMS",
+    "ActionView",
+    "ArmView",
+    "Awareness",
+    "AwarenessError",
+    "AwarenessParameters",
+    "BadParameter",
+    "Blocks",
+    "ClosePoints",
+    "ContextView",
+    "Evidence",
+    "Judgement",
+    "Level",
+    "MalformedModel",
+    "Memory",
+    "NoBlocks",
+    "NoTissueNearRoi",
+    "RobotView",
+    "TissueModel",
+    "TissueView",
+    "UnknownName",
+    "UnusableState",
+    "make_blocks",
+    "make_close_points",
+]

@@ -1,0 +1,39 @@
+"""Joining tissue and robot by tick: keys have no order among each other."""
+
+from dataclasses import dataclass
+
+from fras_common.messages import RobotState, TissueState
+
+
+@dataclass(frozen=True)
+class Moment:
+    """The two states of one tick."""
+
+    tissue: TissueState
+    robot: RobotState
+
+
+class TickJoin:
+    """Hands out each tick once, in order, as soon as both of its states are there."""
+
+    def __init__(self) -> None:
+        self._next = 0
+        self._tissues: dict[int, TissueState] = {}
+        self._robots: dict[int, RobotState] = {}
+
+    def add(self, state: TissueState | RobotState) -> None:
+        """Keep a state until its tick is complete; one of a tick handed out already is dropped."""
+        if state.tick < self._next:
+            return
+        if isinstance(state, TissueState):
+            self._tissues[state.tick] = state
+        else:
+            self._robots[state.tick] = state
+
+    def take(self) -> Moment | None:
+        """Take the next tick, or None while it is incomplete."""
+        tick = self._next
+        if tick not in self._tissues or tick not in self._robots:
+            return None
+        self._next += 1
+        return Moment(self._tissues.pop(tick), self._robots.pop(tick))
