@@ -1,0 +1,16 @@
+"""`python -m fras_motion`."""
+
+import sys
+
+from fras_common.service import run_service
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the service."""
+    return run_service(
+        "motion", "fras_motion.service:MotionService", argv, "Move the arms, tick by tick."
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

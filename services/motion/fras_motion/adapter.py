@@ -1,0 +1,98 @@
+"""Between messages and the motion controller."""
+
+from typing import cast
+
+from fras_common import messages as m
+from fras_common.messages.motion import ActionOutcome
+from fras_common.messages.robot import Joints
+from fras_common.scenario import Scenario
+from fras_motion.parameters import MotionParameters
+from fras_motion.states import ActionResult, ArmState, Goal, Snapshot, Verdict
+
+
+def parameters_of(scenario: Scenario) -> MotionParameters:
+    """Speeds and limits of the scenario."""
+    motion = scenario.motion
+    return MotionParameters(
+        dt_s=scenario.tissue.dt_s,
+        free_speed_m_s=motion.free_speed_m_s,
+        holding_speed_m_s=motion.holding_speed_m_s,
+        acceleration_m_s2=motion.acceleration_m_s2,
+        jerk_m_s3=motion.jerk_m_s3,
+        stop_deceleration_m_s2=motion.stop_deceleration_m_s2,
+        jaw_speed_rad_s=motion.jaw_speed_rad_s,
+        jaw_closed_below_rad=scenario.awareness.closed_jaw_rad,
+        lift_height_m=motion.lift_height_m,
+        clearance_height_m=motion.clearance_height_m,
+        retreat_max_m=motion.retreat_max_m,
+        driver_time_constant_s=motion.joint_time_constant_s,
+    )
+
+
+def goal_of(request: m.ExecuteRequest) -> Goal:
+    """Read the action that shall be done."""
+    return Goal(request.goal_id, request.name, request.arm, request.block, request.target_m)
+
+
+def verdict_of(verdict: m.Verdict) -> Verdict:
+    """Read what the controller needs of a verdict."""
+    return Verdict(
+        tick=verdict.tick,
+        level=verdict.level,
+        reason=verdict.reason,
+        max_force_n=verdict.max_force_n,
+        limit_n=verdict.limit_n,
+        max_node_speed_m_s=verdict.max_node_speed_m_s,
+        grasped=verdict.grasped,
+    )
+
+
+def robot_state(snapshot: Snapshot, trial: str) -> m.RobotState:
+    """Put the robot at one tick on the wire."""
+    action = snapshot.action
+    return m.RobotState(
+        tick=snapshot.tick,
+        trial=trial,
+        arms={name: _arm_state(arm) for name, arm in snapshot.arms.items()},
+        action=m.ActionState(
+            goal_id=action.goal_id,
+            name=action.name,
+            arm=action.arm,
+            block=action.block or "",
+            phase=action.phase,
+        )
+        if action is not None
+        else None,
+        holds=dict(snapshot.holds),
+        verdict_tick=snapshot.verdict_tick,
+    )
+
+
+def action_result(result: ActionResult, goal: Goal, trial: str) -> m.ActionResult:
+    """Put the end of an action on the wire."""
+    return m.ActionResult(
+        tick=result.tick,
+        trial=trial,
+        goal_id=result.goal_id,
+        name=goal.name,
+        arm=goal.arm,
+        block=goal.block or "",
+        outcome=cast(ActionOutcome, result.outcome),
+        reason=result.reason,
+    )
+
+
+def _arm_state(arm: ArmState) -> m.ArmState:
+    pose = arm.tip_in_world
+    return m.ArmState(
+        joints=cast(Joints, tuple(arm.joints)),
+        joint_velocities=cast(Joints, tuple(arm.joint_velocities)),
+        tip_in_world=m.Pose(
+            position_m=pose.position_m,
+            quaternion_xyzw=pose.quaternion_xyzw,
+        ),
+        jaw_rad=arm.jaw_rad,
+        setpoint_joints=cast(Joints, tuple(arm.setpoint_joints)),
+        setpoint_jaw_rad=arm.setpoint_jaw_rad,
+        operating_state=arm.operating_state,  # type: ignore[arg-type]
+    )

@@ -1,0 +1,322 @@
+"""The motion controller: the only clock of the system, and the only one that moves the arms."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from math import isfinite
+
+from fras_motion.drivers import Driver, Measured, Setpoint, SimulatedDriver
+from fras_motion.kinematics import BASES_IN_WORLD, HOME_TIPS_M, ArmKinematics, Pose, Unreachable
+from fras_motion.safety import GATES, Gate, GateRefused, Step
+from fras_motion.trajectory import ProfileImpossible
+
+from .course import Course, Ending, Progress
+from .errors import NoTickWanted, Refused, StaleVerdict
+from .parameters import MotionParameters
+from .primitives import PRIMITIVES, Posture
+from .rehearsal import rehearse
+from .states import ActionResult, ActionState, Advance, ArmState, Goal, Snapshot, Verdict
+
+__all__ = ["MotionController"]
+
+
+class MotionController:
+    """Two arms, one action at a time, one tick per verdict.
+
+    Parameters
+    ----------
+    parameters : MotionParameters, optional
+        The numbers of motion.
+    bases_in_world : mapping of str to Pose, optional
+        Arm -> its remote centre of motion.
+    home_tips_m : mapping of str to tuple of float, optional
+        Arm -> where its tip stands after a reset, world frame [m].
+    drivers : mapping of str to Driver, optional
+        Arm -> its robot; simulated ones by default.
+    gates : mapping of str to Gate, optional
+        What each setpoint has to pass.
+
+    Raises
+    ------
+    Unreachable
+        An arm can't be at its home.
+    """
+
+    def __init__(
+        self,
+        parameters: MotionParameters | None = None,
+        bases_in_world: Mapping[str, Pose] = BASES_IN_WORLD,
+        home_tips_m: Mapping[str, tuple[float, float, float]] = HOME_TIPS_M,
+        drivers: Mapping[str, Driver] | None = None,
+        gates: Mapping[str, Gate] = GATES,
+    ) -> None:
+        p = self._parameters = parameters or MotionParameters()
+        self._gates = gates
+        self._bounds = p.bounds
+        self.arms = {name: ArmKinematics(base) for name, base in bases_in_world.items()}
+        noise = (p.driver_time_constant_s, p.driver_noise_rad, p.driver_noise_m)
+        self._drivers = drivers or {
+            name: SimulatedDriver(*noise, seed=p.driver_seed + number)
+            for number, name in enumerate(self.arms)
+        }
+        self._home = {
+            name: Setpoint(arm.inverse(Pose(home_tips_m[name], arm.tool_down_xyzw)), p.jaw_open_rad)
+            for name, arm in self.arms.items()
+        }
+        self._holds: dict[str, str] = {}
+        self.reset()
+
+    def reset(self) -> Snapshot:
+        """Back to tick 0, the arms at home. Holds stay: a reset is no surgeon's consent.
+
+        Returns
+        -------
+        Snapshot
+            The robot at tick 0.
+        """
+        self._setpoints = dict(self._home)
+        self._measured = {
+            name: self._drivers[name].reset(setpoint) for name, setpoint in self._home.items()
+        }
+        self._tips = {
+            name: self.arms[name].forward(setpoint.joints)
+            for name, setpoint in self._setpoints.items()
+        }
+        self._grasp_heights: dict[str, float] = {}
+        self._course: Course | None = None
+        self._latched = False
+        self._last = self._observe(0, None, -1)
+        return self.snapshot
+
+    @property
+    def snapshot(self) -> Snapshot:
+        """The robot at its last tick, with the holds of now."""
+        course, last = self._course, self._last
+        action = last.action
+        if course is not None and course.stopped and self._holds:
+            action = _action(course.goal, "held")
+        return replace(
+            last,
+            arms={name: self._with_operating_state(arm) for name, arm in last.arms.items()},
+            action=action,
+            holds=dict(sorted(self._holds.items())),
+        )
+
+    @property
+    def wants_tick(self) -> bool:
+        """Whether an action runs, stops, retreats or settles; else logical time stands still."""
+        course = self._course
+        return course is not None and not (self._holds and course.stopped)
+
+    @property
+    def hard_latched(self) -> bool:
+        """Whether the hard limit was crossed and no release has succeeded since."""
+        return self._latched
+
+    def execute(self, goal: Goal) -> None:
+        """Accept an action, after its whole path has passed every gate.
+
+        Parameters
+        ----------
+        goal : Goal
+            What shall be done.
+
+        Raises
+        ------
+        Refused
+            With its reason; the arms stay where they are.
+        """
+        if self._course is not None:
+            running = self._course.goal
+            raise Refused(
+                "busy",
+                f"{running.name} of {running.arm} (goal {running.goal_id}) runs; await its result",
+                goal_id=running.goal_id,
+            )
+        if goal.name not in PRIMITIVES:
+            known = ", ".join(PRIMITIVES)
+            raise Refused("unknown_action", f"{goal.name!r}; there are {known}", action=goal.name)
+        if goal.arm not in self.arms:
+            known = ", ".join(self.arms)
+            raise Refused("unknown_arm", f"{goal.arm!r}; there are {known}", arm=goal.arm)
+        if self._latched and goal.name != "release":
+            raise Refused(
+                "hard_latch",
+                f"the hard force limit was crossed: {goal.name} has to wait for a release",
+                action=goal.name,
+            )
+        if goal.target_m is not None and not all(isfinite(x) for x in goal.target_m):
+            raise Refused("not_finite", f"target {goal.target_m}", target_m=goal.target_m)
+        self._course = self._plan(goal)
+        if self._holds:
+            self._course.hold()
+
+    def hold(self, holder: str, reason: str) -> None:
+        """Stop, and do not move until every holder has lifted its hold.
+
+        Parameters
+        ----------
+        holder : str
+            Who holds; a second hold of the same holder replaces its reason.
+        reason : str
+            Why.
+        """
+        self._holds[holder] = reason
+        if self._course is not None:
+            self._course.hold()
+
+    def resume(self, holder: str) -> bool:
+        """Lift a hold. When the last is lifted, the held action ends with the next tick.
+
+        Parameters
+        ----------
+        holder : str
+            Whose hold.
+
+        Returns
+        -------
+        bool
+            Whether there was one.
+        """
+        return self._holds.pop(holder, None) is not None
+
+    def abort(self, reason: str) -> ActionResult | None:
+        """End the running action without a tick, for no verdict may ever come again.
+
+        The arms stay at their last setpoint. `snapshot` shows the end at the present tick.
+
+        Parameters
+        ----------
+        reason : str
+            Why, e.g. ``hold:sim``.
+
+        Returns
+        -------
+        ActionResult or None
+            None when no action runs.
+        """
+        course = self._course
+        if course is None:
+            return None
+        self._course = None
+        self._last = replace(self._last, action=_action(course.goal, "interrupted"))
+        return ActionResult(course.goal.goal_id, "aborted", reason, self._last.tick)
+
+    def advance(self, verdict: Verdict) -> Advance:
+        """Do one tick.
+
+        Parameters
+        ----------
+        verdict : Verdict
+            On the present tick.
+
+        Returns
+        -------
+        Advance
+            The robot after it, and the action's result if it ended.
+
+        Raises
+        ------
+        StaleVerdict
+            The verdict judges another tick.
+        NoTickWanted
+            No action runs, or it is held at rest.
+        """
+        if verdict.tick != self._last.tick:
+            raise StaleVerdict(self._last.tick, verdict.tick)
+        course = self._course
+        if course is None or not self.wants_tick:
+            raise NoTickWanted(self._last.tick, tuple(sorted(self._holds)))
+        course.react(verdict)
+        self._latched = self._latched or course.crossed_hard
+        progress = self._checked(course, verdict)
+        for name, driver in self._drivers.items():
+            self._measured[name] = driver.servo(self._setpoints[name], self._parameters.dt_s)
+        self._remember_grasp(course.goal.arm)
+        tick = self._last.tick + 1
+        self._last = self._observe(tick, _action(course.goal, progress.phase), verdict.tick)
+        result = None
+        if progress.ending is not None:
+            result = ActionResult(
+                course.goal.goal_id, progress.ending.outcome, progress.ending.reason, tick
+            )
+            self._course = None
+            if course.goal.name == "release" and result.outcome == "succeeded":
+                self._latched = False
+        return Advance(self.snapshot, result)
+
+    def _plan(self, goal: Goal) -> Course:
+        """Lay out an action and walk its whole path through the gates."""
+        arm = self.arms[goal.arm]
+        posture = Posture(
+            arm,
+            self._setpoints[goal.arm],
+            self._tips[goal.arm].position_m,
+            self._closed(self._measured[goal.arm]),
+            self._grasp_heights.get(goal.arm),
+        )
+        try:
+            strokes = PRIMITIVES[goal.name](goal, posture, self._parameters)
+            rehearse(
+                strokes, posture.setpoint, arm, self._parameters.dt_s, self._gates, self._bounds
+            )
+        except Unreachable as fault:
+            raise Refused("unreachable", str(fault), **fault.values) from fault
+        except GateRefused as fault:
+            raise Refused(fault.gate, str(fault), **fault.values) from fault
+        except ProfileImpossible as fault:
+            raise Refused("profile", str(fault), **fault.values) from fault
+        return Course(goal, strokes, self._parameters)
+
+    def _checked(self, course: Course, verdict: Verdict) -> Progress:
+        """Let the action step; a step that fails a gate is not sent and ends the action."""
+        name = course.goal.arm
+        before, tip = self._setpoints[name], self._tips[name]
+        arm = self.arms[name]
+        try:
+            progress = course.step(verdict, before, bool(self._holds))
+            after = arm.forward(progress.setpoint.joints)
+            step = Step(
+                self._parameters.dt_s, before, progress.setpoint, tip, after, arm.tool_down_xyzw
+            )
+            for gate in self._gates.values():
+                gate(step, self._bounds)
+        except GateRefused as fault:
+            return Progress(before, "interrupted", Ending("aborted", f"gate:{fault.gate}"))
+        except Unreachable:
+            return Progress(before, "interrupted", Ending("aborted", "gate:unreachable"))
+        self._setpoints[name], self._tips[name] = progress.setpoint, after
+        return progress
+
+    def _remember_grasp(self, name: str) -> None:
+        """Note the height at which a jaw closed: at the crossing, where the simulator grasps."""
+        if not self._closed(self._measured[name]):
+            self._grasp_heights.pop(name, None)
+        elif name not in self._grasp_heights:
+            self._grasp_heights[name] = self._tips[name].position_m[2]
+
+    def _closed(self, measured: Measured) -> bool:
+        return measured.jaw_rad < self._parameters.jaw_closed_below_rad
+
+    def _with_operating_state(self, arm: ArmState) -> ArmState:
+        return replace(arm, operating_state="PAUSED" if self._holds else "ENABLED")
+
+    def _observe(self, tick: int, action: ActionState | None, verdict_tick: int) -> Snapshot:
+        arms = {
+            name: ArmState(
+                joints=measured.joints,
+                joint_velocities=measured.joint_velocities,
+                tip_in_world=self.arms[name].forward(measured.joints),
+                jaw_rad=measured.jaw_rad,
+                setpoint_joints=self._setpoints[name].joints,
+                setpoint_jaw_rad=self._setpoints[name].jaw_rad,
+                operating_state="ENABLED",
+            )
+            for name, measured in self._measured.items()
+        }
+        return Snapshot(tick, arms, action, {}, verdict_tick)
+
+
+def _action(goal: Goal, phase: str) -> ActionState:
+    return ActionState(goal.goal_id, goal.name, goal.arm, goal.block, phase)

@@ -1,0 +1,104 @@
+"""An arm that is computed: each joint follows its setpoint as a first-order servo."""
+
+from __future__ import annotations
+
+from math import exp
+
+import numpy as np
+
+from fras_motion.kinematics import Joints
+
+from .base import Measured, Setpoint
+
+__all__ = ["SimulatedDriver"]
+
+
+class SimulatedDriver:
+    """First-order joint servo with optional measurement noise.
+
+    Parameters
+    ----------
+    time_constant_s : float
+        Time constant tau of every joint and of the jaw [s]; 0 is an ideal arm.
+    noise_rad, noise_m : float
+        Standard deviation of what is measured, of angles [rad] and of the insertion [m].
+    seed : int
+        Seed of the noise; the sequence starts anew at each reset.
+
+    Notes
+    -----
+    tau dq/dt = u - q with u constant over the tick has the exact solution
+    q(t + dt) = u + (q(t) - u) exp(-dt / tau).
+    """
+
+    def __init__(
+        self,
+        time_constant_s: float = 0.01,
+        noise_rad: float = 0.0,
+        noise_m: float = 0.0,
+        seed: int = 0,
+    ) -> None:
+        self._time_constant_s = time_constant_s
+        self._noise = np.array([noise_rad, noise_rad, noise_m, *[noise_rad] * 4])
+        self._noisy = bool(self._noise.any())
+        self._seed = seed
+        self._generator = np.random.default_rng(seed)
+        self._state: tuple[float, ...] = ()
+        self._last: tuple[float, ...] = ()
+
+    def reset(self, setpoint: Setpoint) -> Measured:
+        """Stand at a setpoint, at rest; the noise starts anew.
+
+        Parameters
+        ----------
+        setpoint : Setpoint
+            Where a trial begins.
+
+        Returns
+        -------
+        Measured
+            The arm at tick 0, its velocities zero.
+        """
+        self._generator = np.random.default_rng(self._seed)
+        self._state = (*setpoint.joints, setpoint.jaw_rad)
+        self._last = self._measure()
+        return _measured(self._last, (0.0,) * 6)
+
+    def servo(self, setpoint: Setpoint, dt_s: float) -> Measured:
+        """Follow a setpoint for one tick.
+
+        Parameters
+        ----------
+        setpoint : Setpoint
+            What holds from now to the end of the tick.
+        dt_s : float
+            Duration of the tick [s].
+
+        Returns
+        -------
+        Measured
+            The arm at the end of the tick.
+        """
+        left = exp(-dt_s / self._time_constant_s) if self._time_constant_s > 0.0 else 0.0
+        goal = (*setpoint.joints, setpoint.jaw_rad)
+        self._state = tuple(u + (q - u) * left for u, q in zip(goal, self._state, strict=True))
+        now = self._measure()
+        before, self._last = self._last, now
+        return _measured(
+            now, tuple((b - a) / dt_s for a, b in zip(before[:6], now[:6], strict=True))
+        )
+
+    def _measure(self) -> tuple[float, ...]:
+        if not self._noisy:
+            return self._state
+        errors: list[float] = self._generator.normal(0.0, self._noise).tolist()
+        return tuple(q + e for q, e in zip(self._state, errors, strict=True))
+
+
+def _measured(values: tuple[float, ...], velocities: tuple[float, ...]) -> Measured:
+    return Measured(_six(values[:6]), _six(velocities), values[6])
+
+
+def _six(values: tuple[float, ...]) -> Joints:
+    a, b, c, d, e, f = values
+    return (a, b, c, d, e, f)

@@ -1,0 +1,71 @@
+"""Holds: a set with owners, changed from any thread, read by the loop before it moves anything."""
+
+import threading
+from typing import Final
+
+from fras_common.errors import FrasError
+from fras_motion.controller import MotionController
+
+LIFTS_ANY: Final = frozenset({"cli", "monitor"})
+"""Where a person stands behind the request; software lifts its own holds only."""
+
+
+class NotYourHold(FrasError):
+    """A hold may be lifted by its owner, or by a person."""
+
+
+class UnknownHold(FrasError):
+    """Nobody of that name holds."""
+
+
+class Holds:
+    """Who holds the arms, and why; thread-safe."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._reasons: dict[str, str] = {}
+
+    def hold(self, holder: str, reason: str) -> dict[str, str]:
+        """Add a hold; returns all that are in force."""
+        with self._lock:
+            self._reasons[holder] = reason
+            return dict(self._reasons)
+
+    def resume(self, holder: str, by: str) -> dict[str, str]:
+        """Lift a hold; returns those still in force.
+
+        Raises
+        ------
+        UnknownHold
+            If there is no such hold.
+        NotYourHold
+            If `by` is neither its owner nor a person, nor the executive after a restart.
+        """
+        with self._lock:
+            if holder not in self._reasons:
+                names = ", ".join(sorted(self._reasons)) or "nobody"
+                raise UnknownHold(f"{holder!r} holds nothing; held by: {names}", holder=holder)
+            after_restart = by == "executive" and holder == "restart"
+            if by != holder and by not in LIFTS_ANY and not after_restart:
+                raise NotYourHold(
+                    f"the hold of {holder!r} is not for {by!r} to lift: ask {holder!r}, "
+                    "or `fras resume`",
+                    holder=holder,
+                    by=by,
+                )
+            del self._reasons[holder]
+            return dict(self._reasons)
+
+    def current(self) -> dict[str, str]:
+        """All holds in force."""
+        with self._lock:
+            return dict(self._reasons)
+
+    def impose(self, controller: MotionController) -> None:
+        """Make the controller's holds those in force."""
+        wanted, standing = self.current(), controller.snapshot.holds
+        for holder, reason in wanted.items():
+            if standing.get(holder) != reason:
+                controller.hold(holder, reason)
+        for holder in standing.keys() - wanted.keys():
+            controller.resume(holder)

@@ -1,0 +1,76 @@
+"""Path limits under which the joints keep their own limits."""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+
+from fras_motion.kinematics import JOINTS, ArmKinematics, Pose, Quaternion
+
+from .line import Line
+from .profile import Limits
+
+__all__ = ["within_joint_rates"]
+
+_SAMPLES = 33
+# Between the samples the derivatives may be a little larger than at them.
+_RESERVE = 0.95
+_SPEEDS = np.array([joint.speed for joint in JOINTS])
+_ACCELERATIONS = np.array([joint.acceleration for joint in JOINTS])
+
+
+def within_joint_rates(
+    arm: ArmKinematics, line: Line, orientation_xyzw: Quaternion, limits: Limits
+) -> Limits:
+    """Lower the limits along a line until the joints' speeds and accelerations allow them.
+
+    Parameters
+    ----------
+    arm : ArmKinematics
+        The arm that shall follow the line.
+    line : Line
+        The tip's path in the world; every point of it reachable.
+    orientation_xyzw : tuple of float, length 4
+        The tip's fixed orientation in the world.
+    limits : Limits
+        What is wished along the line [m/s, m/s^2, m/s^3].
+
+    Returns
+    -------
+    Limits
+        At most what was wished; the jerk is kept.
+
+    Raises
+    ------
+    Unreachable
+        A sampled point of the line is out of reach.
+
+    Notes
+    -----
+    Along q(s): dq/dt = q' s', d2q/dt2 = q'' s'^2 + q' s''. With g and c the largest |q'| and
+    |q''| of a joint over the line, s'^2 c is granted half of the joint's acceleration and s'' g
+    what is left of it. q' = J^-1 (t, 0) with the line's direction t.
+    """
+    direction = np.zeros(6)
+    direction[:3] = (np.array(line.end) - np.array(line.start)) / line.length
+    arc = np.linspace(0.0, line.length, _SAMPLES)
+    slopes = np.array(
+        [
+            np.linalg.solve(
+                arm.jacobian(arm.inverse(Pose(line.point(float(s)), orientation_xyzw))), direction
+            )
+            for s in arc
+        ]
+    )
+    slope = np.abs(slopes).max(axis=0)
+    curvature = np.abs(np.diff(slopes, axis=0)).max(axis=0) / float(arc[1])
+    tiny = np.finfo(np.float64).tiny
+    speed = min(
+        limits.speed,
+        _RESERVE * float((_SPEEDS / (slope + tiny)).min()),
+        sqrt(0.5 * _RESERVE * float((_ACCELERATIONS / (curvature + tiny)).min())),
+    )
+    left = _RESERVE * _ACCELERATIONS - curvature * speed**2
+    acceleration = min(limits.acceleration, float((left / (slope + tiny)).min()))
+    return Limits(speed, acceleration, limits.jerk)
