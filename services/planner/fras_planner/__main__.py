@@ -1,0 +1,19 @@
+"""`python -m fras_planner`."""
+
+import sys
+
+from fras_common.service import run_service
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the planner and its executive."""
+    return run_service(
+        "planner",
+        "fras_planner.service:PlannerService",
+        argv,
+        "Plan in Answer Set Programming, and act.",
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,38 @@
+"""What the executive asks the world to do: it yields an effect, the shell sends back what came."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from fras_common.messages import Plan, TaskStatus
+from fras_common.topics import Query
+
+
+@dataclass(frozen=True)
+class Ask:
+    """Ask `query`; sends back the reply, throws `RemoteFault` or `NoAnswer`."""
+
+    query: Query[Any, Any]
+    request: Any
+    timeout_s: float
+
+
+@dataclass(frozen=True)
+class AwaitResult:
+    """Wait for the end of an action; sends back its `ActionResult`."""
+
+    goal_id: str
+
+
+@dataclass(frozen=True)
+class Say:
+    """Publish; sends back the message as it was stamped."""
+
+    message: Plan | TaskStatus
+
+
+@dataclass(frozen=True)
+class Accept:
+    """The trial has begun and its log is open: answer whoever started it."""
+
+
+Effect = Ask | AwaitResult | Say | Accept

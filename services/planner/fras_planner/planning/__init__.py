@@ -1,0 +1,40 @@
+"""The planning core: contexts in, plans with their reasons out; no bus, no clock, no file."""
+
+from fras_planner.planning.errors import (
+    ContradictoryFluents,
+    EmptyContext,
+    KnowledgeFault,
+    PlanningError,
+    SceneChanged,
+    SceneOutOfBounds,
+    UnknownArm,
+    UnknownBlock,
+    UnknownCriterion,
+    UnknownFluent,
+    UnknownGoal,
+)
+from fras_planner.planning.plan import NoPlan, Plan, PlannedAction
+from fras_planner.planning.program import Knowledge
+from fras_planner.planning.scene import Context, PlanningScene
+from fras_planner.planning.solver import Planner
+
+__all__ = [
+    "Context",
+    "ContradictoryFluents",
+    "EmptyContext",
+    "Knowledge",
+    "KnowledgeFault",
+    "NoPlan",
+    "Plan",
+    "PlannedAction",
+    "Planner",
+    "PlanningError",
+    "PlanningScene",
+    "SceneChanged",
+    "SceneOutOfBounds",
+    "UnknownArm",
+    "UnknownBlock",
+    "UnknownCriterion",
+    "UnknownFluent",
+    "UnknownGoal",
+]

@@ -1,0 +1,90 @@
+"""Tells a finished plan: its actions by name, its history, its reasons in words.
+
+The rules for that (`history.lp`, `explain.lp`) run on one plan as facts, outside the search.
+"""
+
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import clingo
+
+from fras_planner.planning.plan import PlannedAction
+from fras_planner.planning.program import TELL_FILES, Knowledge, Program
+
+
+@dataclass(frozen=True)
+class Story:
+    """A plan told: the actions, the atoms that change at each step, the reasons."""
+
+    actions: tuple[PlannedAction, ...]
+    history: dict[int, tuple[str, ...]]
+    explanation: tuple[str, ...]
+
+
+def tell_plan(knowledge: Knowledge, facts: Iterable[str], steps: int) -> Story:
+    """Tell a plan.
+
+    Parameters
+    ----------
+    knowledge : Knowledge
+    facts : iterable of str
+        The model's shown atoms, its context, the scene's facts about the blocks involved.
+    steps : int
+        Steps of the plan, the last one included at which the goal holds.
+    """
+    told = _told(knowledge, [*facts, f"step(1..{steps})"], ("history", "explain"))
+    expected: dict[int, list[str]] = defaultdict(list)
+    for t, atom in _rows(told, "expected", 2):
+        expected[t.number].append(str(atom))
+    holds: dict[int, list[str]] = defaultdict(list)
+    for atom, t in _rows(told, "holds", 2):
+        holds[t.number].append(str(atom))
+    actions = {
+        t.number: PlannedAction(
+            t=t.number,
+            text=str(action),
+            name=action.name,
+            args=tuple(str(argument) for argument in action.arguments),
+            expected=tuple(sorted(expected[t.number])),
+        )
+        for action, t in _rows(told, "does", 2)
+    }
+    history = {
+        t: (*([actions[t].text] if t in actions else []), *sorted(holds[t]))
+        for t in range(1, steps + 1)
+    }
+    return Story(tuple(actions[t] for t in sorted(actions)), history, _sentences(told))
+
+
+def tell_no_plan(
+    knowledge: Knowledge, facts: Iterable[str], core: Sequence[str]
+) -> tuple[str, ...]:
+    """Tell why there is no plan, from the scene's facts, the context and the core of rules."""
+    blamed = [f"core({rule})" for rule in core]
+    return _sentences(_told(knowledge, [*facts, *blamed], ("no_plan",)))
+
+
+def _told(knowledge: Knowledge, facts: Iterable[str], parts: Sequence[str]) -> Program:
+    program = Program(knowledge, TELL_FILES, ())
+    program.ground(*((part, ()) for part in ("base", *parts)), facts=facts)
+    # Facts in, facts out: grounding has done all the work, no search is needed. The program is
+    # handed on whole, because its atoms are gone with it.
+    return program
+
+
+def _rows(told: Program, predicate: str, arity: int) -> list[Sequence[clingo.Symbol]]:
+    atoms = told.control.symbolic_atoms.by_signature(predicate, arity)
+    return [atom.symbol.arguments for atom in atoms]
+
+
+def _sentences(told: Program) -> tuple[str, ...]:
+    rows = [
+        (order.number, text.string, [_spoken(value) for value in values.arguments])
+        for order, text, values in _rows(told, "sentence", 3)
+    ]
+    return tuple(text.format(*values) for _, text, values in sorted(rows))
+
+
+def _spoken(value: clingo.Symbol) -> str:
+    return value.string if value.type == clingo.SymbolType.String else str(value)

@@ -1,0 +1,98 @@
+"""Reading the rule files: where from, and how a fault is told."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from fras_planner.knowledge import load_knowledge
+from fras_planner.planning import Knowledge, KnowledgeFault, Planner, PlanningScene
+
+ASP = Path(__file__).resolve().parents[2] / "asp"
+MAX_LINES = 80
+
+
+@pytest.fixture
+def copy(tmp_path: Path) -> Path:
+    return Path(shutil.copytree(ASP, tmp_path / "asp"))
+
+
+def test_the_checkout_is_found(knowledge: Knowledge) -> None:
+    assert {"domain.lp", "explain.lp", "preferences/weighted.lp"} <= set(knowledge.files)
+    assert knowledge.criteria == ("lex", "literal", "nearest", "sum", "weighted")
+    assert len(knowledge.digest) == 64
+    assert knowledge.alphabet.arms == ("psm1", "psm2")
+
+
+def test_every_file_is_short_and_says_what_it_is_for(knowledge: Knowledge) -> None:
+    for name, text in knowledge.files.items():
+        assert text.count("\n") < MAX_LINES, name
+        header = text[: text.index("#program")]
+        assert header.startswith(f"% {Path(name).name}:")
+        assert "input" in header, name
+        assert "output" in header, name
+
+
+def test_the_digest_follows_every_byte(copy: Path, knowledge: Knowledge) -> None:
+    assert load_knowledge(copy).digest == knowledge.digest
+    with (copy / "preferences" / "lex.lp").open("a") as file:
+        file.write("% a remark\n")
+    assert load_knowledge(copy).digest != knowledge.digest
+
+
+def test_a_rule_changed_changes_the_plan(copy: Path) -> None:
+    names = ["b(1,1)", "b(1,2)", "b(1,3)"]
+    rows = [(0, 0, 0), (0, 0.01, 0), (0, 0.02, 0)]
+    statics = [*(f"reachable(psm1,{name})" for name in names), "fixed(b(1,1))"]
+    scene = PlanningScene.make(names, rows, (0, 0.01, 0), statics)
+    assert Planner(load_knowledge(copy), scene).plan([]).target == "b(1,3)"
+    weighted = copy / "preferences" / "weighted.lp"
+    weighted.write_text(weighted.read_text().replace("2*Gap-Roi", "Gap-2*Roi"))
+    assert Planner(load_knowledge(copy), scene).plan([]).target == "b(1,2)"
+
+
+def test_a_criterion_of_ones_own(copy: Path) -> None:
+    own = "#program base.\npreference(B,-Gap,1) :- nearest_attachment(B,Gap).\n"
+    (copy / "preferences" / "reckless.lp").write_text(own)
+    assert "reckless" in load_knowledge(copy).criteria
+
+
+@pytest.mark.parametrize(
+    ("file", "rule", "says"),
+    [
+        ("effects.lp", "closed_gripper(A,t :- occurs(grasp,A,t-1).", "syntax error"),
+        ("actions.lp", "busy(X) :- not busy(t-1).", "unsafe"),
+        ("constraints.lp", "rule(x) :- clsoed_gripper(psm1).", "does not occur in any rule head"),
+        ("preferences/sum.lp", "preference(B,1/0,1) :- block(B).", "operation undefined"),
+        ("explain.lp", "sentence(0,X,()) :- does(_,_).", "unsafe"),
+    ],
+)
+def test_a_fault_is_told_with_file_and_line(copy: Path, file: str, rule: str, says: str) -> None:
+    path = copy / file
+    line = path.read_text().count("\n") + 1
+    with path.open("a") as out:
+        out.write(rule + "\n")
+    with pytest.raises(KnowledgeFault) as caught:
+        load_knowledge(copy)
+    assert (caught.value.file, caught.value.line) == (str(path), line)
+    assert says in caught.value.message
+
+
+def test_a_missing_file_is_named(copy: Path, tmp_path: Path) -> None:
+    (copy / "goal.lp").unlink()
+    with pytest.raises(KnowledgeFault, match=r"goal\.lp: this file is missing"):
+        load_knowledge(copy)
+    with pytest.raises(KnowledgeFault, match=r"no domain\.lp"):
+        load_knowledge(tmp_path)
+
+
+def test_knowledge_without_criteria_is_refused(copy: Path) -> None:
+    shutil.rmtree(copy / "preferences")
+    with pytest.raises(KnowledgeFault, match="no criterion"):
+        load_knowledge(copy)
+
+
+def test_text_that_is_no_text_is_named(copy: Path) -> None:
+    (copy / "goal.lp").write_bytes(b"\xff\xfe")
+    with pytest.raises(KnowledgeFault, match="cannot be read"):
+        load_knowledge(copy)

@@ -1,0 +1,201 @@
+"""Why this plan, in words; why none: a minimal core and the facts behind it."""
+
+from collections.abc import Callable
+
+import pytest
+
+from fras_planner.planning import Knowledge, Planner, PlanningScene
+
+SceneMaker = Callable[..., PlanningScene]
+
+
+@pytest.fixture(scope="module")
+def scene() -> PlanningScene:
+    """Four blocks 40 mm apart, the ROI 10 mm beside (1,2), an attachment under (1,1)."""
+    names = ["b(1,1)", "b(1,2)", "b(2,1)", "b(2,2)"]
+    blocks = [(0.0, 0.0, 0.0), (0.0, 0.04, 0.0), (0.04, 0.0, 0.0), (0.04, 0.04, 0.0)]
+    statics = ["fixed(b(1,1))", "above_roi(b(1,2))"]
+    statics += ["reachable(psm1,b(1,1))", "reachable(psm1,b(2,1))"]
+    statics += ["reachable(psm2,b(1,2))", "reachable(psm2,b(2,2))"]
+    return PlanningScene.make(names, blocks, (0.01, 0.04, -0.001), statics)
+
+
+@pytest.fixture(scope="module")
+def planner(knowledge: Knowledge, scene: PlanningScene) -> Planner:
+    return Planner(knowledge, scene)
+
+
+def bare(scene: PlanningScene, *statics: str) -> PlanningScene:
+    return PlanningScene.make(scene.names, scene.blocks_m, scene.roi_m, statics)
+
+
+def test_the_choice_is_told_with_its_numbers(planner: Planner) -> None:
+    assert planner.plan([]).explanation == (
+        "psm2 grasps b(2,2): 57 mm from the nearest attachment, 30 mm from the region of interest; "
+        "best of 3 candidate blocks under the criterion 'weighted'.",
+        "psm2 pulls b(2,2) up to expose the region of interest.",
+    )
+
+
+def test_a_choice_that_ignores_attachments_says_so(planner: Planner) -> None:
+    assert planner.plan([], ignore_ap=True).explanation[0] == (
+        "psm2 grasps b(1,2): 10 mm from the region of interest, the nearest of 4 candidate blocks; "
+        "attachment points are ignored as asked."
+    )
+
+
+def test_a_choice_without_attachments_says_so(knowledge: Knowledge, scene: PlanningScene) -> None:
+    free = bare(scene, *(atom for atom in scene.statics if not atom.startswith("fixed")))
+    assert Planner(knowledge, free).plan([], tried=["b(1,1)"]).explanation[0] == (
+        "psm2 grasps b(1,2): no attachment is known, 10 mm from the region of interest; "
+        "best of 3 candidate blocks under the criterion 'weighted'."
+    )
+
+
+@pytest.mark.parametrize(
+    ("state", "tried", "first"),
+    [
+        (
+            ["in_hand(psm1,b(2,1))", "closed_gripper(psm1)", "max_height(psm1)"],
+            [],
+            "The tissue is moved sideways to b(1,2) because psm1 may not pull higher.",
+        ),
+        (
+            ["in_hand(psm1,b(2,1))", "closed_gripper(psm1)"],
+            [],
+            "psm1 still holds b(2,1) and may pull higher: it pulls on.",
+        ),
+        (
+            ["in_hand(psm1,b(2,1))", "closed_gripper(psm1)"],
+            ["b(2,1)"],
+            "psm1 lets go of b(2,1): it was tried in vain.",
+        ),
+        (
+            ["in_hand(psm1,b(1,1))", "closed_gripper(psm1)"],
+            [],
+            "psm1 lets go of b(1,1): it lies over an attachment point.",
+        ),
+        (
+            ["closed_gripper(psm2)"],
+            [],
+            "psm2 opens its gripper: it holds nothing.",
+        ),
+    ],
+)
+def test_what_follows_from_the_state_is_told(
+    planner: Planner, state: list[str], tried: list[str], first: str
+) -> None:
+    assert planner.plan(state, tried=tried).explanation[0] == first
+
+
+def test_tissue_that_cannot_be_moved_is_let_go(knowledge: Knowledge, scene: PlanningScene) -> None:
+    lost = bare(scene, *(atom for atom in scene.statics if not atom.startswith("above_roi")))
+    state = ["in_hand(psm1,b(2,1))", "closed_gripper(psm1)", "max_height(psm1)"]
+    plan = Planner(knowledge, lost).plan(state)
+    assert plan.actions[0].text == "release(psm1)"
+    assert plan.explanation[0] == ("psm1 lets go of b(2,1) so that the tissue can be grasped anew.")
+
+
+# --- no plan ----------------------------------------------------------------------------------
+
+
+def test_everything_tried(planner: Planner, scene: PlanningScene) -> None:
+    none = planner.plan([], tried=scene.names).no_plan
+    assert none is not None
+    assert none.core == ("see_roi", "try_once")
+    assert none.sentences == (
+        "No plan of at most 5 actions reaches the goal.",
+        "Rule: A block that was tried in vain is not tried again.",
+        "Rule: The region of interest must be visible at the end.",
+        "4 of the 4 blocks that an arm reaches have been tried in vain.",
+    )
+
+
+def test_everything_attached(knowledge: Knowledge, scene: PlanningScene) -> None:
+    attached = bare(scene, *scene.statics, *(f"fixed({name})" for name in scene.names))
+    planner = Planner(knowledge, attached)
+    plan = planner.plan([])
+    assert plan.actions == ()
+    assert plan.no_plan is not None
+    assert plan.no_plan.core == ("keep_off_attachments", "see_roi")
+    assert plan.explanation == plan.no_plan.sentences
+    assert plan.no_plan.sentences[-1] == (
+        "Attachment points lie under 4 of the 4 blocks that an arm reaches."
+    )
+    assert planner.plan([], ignore_ap=True).no_plan is None
+
+
+def test_attached_or_tried_between_them(planner: Planner) -> None:
+    none = planner.plan([], tried=["b(1,2)", "b(2,1)", "b(2,2)"]).no_plan
+    assert none is not None
+    # Either rule alone, lifted, would leave a block: both are to blame.
+    assert none.core == ("keep_off_attachments", "see_roi", "try_once")
+
+
+def test_nothing_in_reach(knowledge: Knowledge, scene: PlanningScene) -> None:
+    none = Planner(knowledge, bare(scene, "fixed(b(1,1))")).plan([]).no_plan
+    assert none is not None
+    assert none.core == ("see_roi",)
+    assert "No arm reaches any block." in none.sentences
+
+
+def test_nowhere_to_move(knowledge: Knowledge, scene: PlanningScene) -> None:
+    stuck = Planner(knowledge, bare(scene, "reachable(psm1,b(2,1))"))
+    state = ["in_hand(psm1,b(2,1))", "closed_gripper(psm1)", "max_height(psm1)"]
+    none = stuck.plan(state, tried=["b(2,1)"]).no_plan
+    assert none is not None
+    assert (
+        "No block is known to lie above the region of interest, so tissue cannot be moved there."
+        in none.sentences
+    )
+
+
+def test_a_horizon_too_short(knowledge: Knowledge, scene: PlanningScene) -> None:
+    none = Planner(knowledge, scene, horizon=2).plan([]).no_plan
+    assert none is not None
+    assert none.sentences[0] == "No plan of at most 2 actions reaches the goal."
+    assert none.sentences[-1] == "3 candidate blocks are left, but 2 actions are too few."
+
+
+def test_each_core_is_needed_whole(knowledge: Knowledge, make_scene: SceneMaker) -> None:
+    """With any rule of a core struck from the knowledge there is a plan."""
+    scene = make_scene(3, 1, fixed=["b(1,1)", "b(2,2)"])
+    tried = [name for name in scene.names if name not in {"b(1,1)", "b(2,2)"}]
+    none = Planner(knowledge, scene).plan([], tried=tried).no_plan
+    assert none is not None
+    assert len(none.core) == 3
+    for rule in none.core:
+        files = dict(knowledge.files)
+        assert f"{rule};" in files["constraints.lp"]
+        files["constraints.lp"] = files["constraints.lp"].replace(f"{rule};", "", 1)
+        lifted = Planner(Knowledge(files, ""), scene).plan([], tried=tried)
+        assert lifted.no_plan is None, rule
+
+
+def test_a_spent_budget_is_said_without_blaming_a_rule(
+    knowledge: Knowledge, scene: PlanningScene
+) -> None:
+    plan = Planner(knowledge, scene, conflict_budget=0).plan([])
+    assert plan.no_plan is not None
+    assert not plan.optimal
+    assert plan.no_plan.core == ("search_budget",)
+    assert plan.explanation == (
+        "The search ended before a plan was found: allow it more conflicts.",
+    )
+
+
+def test_a_small_budget_gives_the_best_plan_so_far(
+    knowledge: Knowledge, make_scene: SceneMaker
+) -> None:
+    unproved = 0
+    state = ["in_hand(psm1,b(1,1))", "closed_gripper(psm1)"]
+    for seed in range(10):
+        scene = make_scene(7, seed)
+        tried = scene.names[:24]
+        best = Planner(knowledge, scene).plan(state, tried=tried)
+        hasty = Planner(knowledge, scene, conflict_budget=2).plan(state, tried=tried)
+        if hasty.no_plan is None:
+            assert hasty.actions[-1].name == "pull"
+            assert hasty.cost >= best.cost
+            unproved += not hasty.optimal
+    assert unproved

@@ -1,0 +1,82 @@
+"""A planner that has planned before gives what a fresh one gives, in any state."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from fras_planner.planning import Knowledge, Plan, Planner, PlanningScene
+
+SceneMaker = Callable[..., PlanningScene]
+
+
+def random_state(rng: np.random.Generator, names: tuple[str, ...]) -> list[str]:
+    state: list[str] = []
+    for arm in ("psm1", "psm2"):
+        where = [str(name) for name in rng.choice(names, size=int(rng.integers(0, 3)))]
+        closed = rng.random() < 0.5
+        state += [f"at({arm},{name})" for name in where]
+        if closed:
+            state.append(f"closed_gripper({arm})")
+            state += [f"in_hand({arm},{name})" for name in where]
+        if rng.random() < 0.3:
+            state.append(f"max_height({arm})")
+    if rng.random() < 0.15:
+        state.append("visible_roi")
+    return state
+
+
+def outcome(plan: Plan) -> tuple[object, ...]:
+    sentences = None if plan.no_plan is None else plan.no_plan
+    return plan.actions, plan.target, plan.arm, plan.cost, plan.history, plan.explanation, sentences
+
+
+@pytest.mark.parametrize("criterion", ["weighted", "lex"])
+@pytest.mark.parametrize("goal", ["visible", "clear"])
+def test_warm_equals_fresh(
+    knowledge: Knowledge, make_scene: SceneMaker, criterion: str, goal: str
+) -> None:
+    rng = np.random.default_rng(7)
+    kinds: set[str] = set()
+    for seed in range(3):
+        scene = make_scene(4, seed)
+        warm = Planner(knowledge, scene, criterion, goal)
+        for _ in range(40):
+            state = random_state(rng, scene.names)
+            share = rng.choice([0.0, 0.3, 1.0])
+            tried = [name for name in scene.names if rng.random() < share]
+            ignore_ap = bool(rng.random() < 0.2)
+            plan = warm.plan(state, ignore_ap, tried)
+            fresh = Planner(knowledge, scene, criterion, goal).plan(state, ignore_ap, tried)
+            assert outcome(plan)[:6] == outcome(fresh)[:6], (seed, state, tried, ignore_ap)
+            kinds |= {action.name for action in plan.actions}
+            kinds |= {"none"} if plan.no_plan else set()
+    assert kinds == {"reach", "grasp", "pull", "move", "release", "none"}
+
+
+def test_the_order_of_the_fluents_does_not_matter(
+    knowledge: Knowledge, make_scene: SceneMaker
+) -> None:
+    scene = make_scene(5, 1)
+    state = ["closed_gripper(psm1)", "at(psm1,b(2,2))", "in_hand(psm1,b(2,2))", *scene.statics]
+    planner = Planner(knowledge, scene)
+    there = planner.plan(sorted(state), tried=["b(2,2)", "b(3,3)"])
+    back = planner.plan(sorted(state, reverse=True), tried=["b(3,3)", "b(2,2)"])
+    assert outcome(there) == outcome(back)
+
+
+def test_each_plan_leads_to_its_goal_by_its_own_history(
+    knowledge: Knowledge, make_scene: SceneMaker
+) -> None:
+    rng = np.random.default_rng(11)
+    scene = make_scene(4, 2)
+    planner = Planner(knowledge, scene)
+    for _ in range(100):
+        plan = planner.plan(random_state(rng, scene.names))
+        steps = len(plan.actions) + 1
+        assert "visible_roi" in plan.history[steps]
+        for action in plan.actions:
+            assert action.text in plan.history[action.t]
+            after = plan.history[action.t + 1]
+            for atom in action.expected:
+                assert (atom.lstrip("-") in after) != atom.startswith("-")
