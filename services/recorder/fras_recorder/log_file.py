@@ -1,0 +1,160 @@
+"""One audit log: an MCAP file that holds every sample of a trial verbatim.
+
+Topic = key without the cell, message encoding `msgpack`, schema = JSON Schema of the type,
+publish time = producer's stamp, log time = arrival. Readable by any MCAP reader.
+"""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+from mcap.writer import CompressionType, Writer
+
+from fras_common.bus import RawSample
+from fras_common.codec import HeaderFields, json_schema, read_header
+from fras_common.errors import FrasError
+from fras_common.topics import topic_of
+
+PROFILE = "fras"
+CHUNK_BYTES = 1024 * 1024
+
+
+class LogExists(FrasError):
+    """A log is never written over."""
+
+
+class LogFile:
+    """Writes one file; not thread-safe: its owner calls from one thread.
+
+    Parameters
+    ----------
+    path : Path
+        Must not exist; its directory is made.
+    metadata : mapping of str to str
+        Written first, as the MCAP metadata record `fras`.
+    attachments : mapping of name to bytes
+        Files that belong to the trial, e.g. the scenario.
+    now_ns : int
+        Wall clock for the attachments.
+
+    Raises
+    ------
+    LogExists
+        If there is a file at `path` already.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        metadata: Mapping[str, str],
+        attachments: Mapping[str, bytes],
+        now_ns: int,
+    ) -> None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            self._stream = path.open("xb")
+        except FileExistsError as error:
+            raise LogExists(
+                f"{path} exists: a log is never written over, choose another directory", path=path
+            ) from error
+        self.path = path
+        self.bytes_written = 0
+        self.messages = 0
+        self.lost = 0
+        self._seqs: dict[tuple[str, str], int] = {}
+        self._channels: dict[str, int] = {}
+        self._schemas: dict[str, int] = {}
+        self._writer = Writer(
+            self._stream,
+            chunk_size=CHUNK_BYTES,
+            compression=CompressionType.ZSTD,
+            enable_crcs=True,
+            enable_data_crcs=True,
+        )
+        self._writer.start(profile=PROFILE, library="fras_recorder")
+        self._writer.add_metadata("fras", dict(metadata))
+        for name, data in attachments.items():
+            self._writer.add_attachment(
+                create_time=now_ns,
+                log_time=now_ns,
+                name=name,
+                media_type="application/octet-stream",
+                data=data,
+            )
+        self.flush()
+
+    def write(self, sample: RawSample, arrival_ns: int) -> HeaderFields | None:
+        """Append a sample, unless it is a copy of one that the file holds already.
+
+        Returns
+        -------
+        HeaderFields or None
+            The sample's header; None for a payload without one, which is recorded all the same.
+        """
+        header = read_header(sample.payload)
+        if header is not None and not self._in_sequence(sample.key, header):
+            return header
+        self._writer.add_message(
+            channel_id=self._channel(sample),
+            log_time=arrival_ns,
+            data=sample.payload,
+            publish_time=header.stamp_ns if header is not None else arrival_ns,
+            sequence=header.seq if header is not None else 0,
+        )
+        self.messages += 1
+        return header
+
+    def flush(self) -> None:
+        """Close the chunk under way and hand it to the operating system.
+
+        The library closes chunks by size only; a quiet second would stay in memory.
+        """
+        self._writer.flush()
+        self.bytes_written = self._stream.tell()
+
+    def close(self, summary: Mapping[str, str]) -> None:
+        """Write the closing metadata and the index, and close the file."""
+        self.flush()
+        self._writer.add_metadata("fras.closed", dict(summary))
+        self._writer.finish()
+        self.bytes_written = self._stream.tell()
+        self._stream.close()
+
+    def abandon(self) -> None:
+        """Let go of a file that can't be written any more; what was flushed stays readable."""
+        # The raw stream: a buffered one would try again to write what just failed.
+        self._stream.raw.close()
+
+    def _in_sequence(self, key: str, header: HeaderFields) -> bool:
+        """Count what is missing before this sample; False if it was recorded before."""
+        stream = (key, header.source)
+        last = self._seqs.get(stream)
+        if last is not None and header.seq <= last:
+            return False
+        if last is not None:
+            self.lost += header.seq - last - 1
+        self._seqs[stream] = header.seq
+        return True
+
+    def _channel(self, sample: RawSample) -> int:
+        if sample.key not in self._channels:
+            self._channels[sample.key] = self._writer.register_channel(
+                topic=sample.key,
+                message_encoding="msgpack",
+                schema_id=self._schema(sample.key),
+                metadata={"zenoh_encoding": sample.encoding},
+            )
+        return self._channels[sample.key]
+
+    def _schema(self, key: str) -> int:
+        topic = topic_of(key)
+        if topic is None:
+            return 0
+        name = topic.type.__name__
+        if name not in self._schemas:
+            self._schemas[name] = self._writer.register_schema(
+                name=f"fras.{name}",
+                encoding="jsonschema",
+                data=json.dumps(json_schema(topic.type)).encode(),
+            )
+        return self._schemas[name]

@@ -1,0 +1,158 @@
+"""The recorder's shell: every sample of the cell into one MCAP file a trial."""
+
+import time
+from pathlib import Path
+
+import msgspec
+
+from fras_common.bus import RawSample
+from fras_common.codec import content_digest
+from fras_common.errors import FrasError
+from fras_common.messages import (
+    CloseReply,
+    CloseRequest,
+    OpenRequest,
+    RecorderStatus,
+    ResetReply,
+)
+from fras_common.service import Deferred, ServiceHost
+from fras_common.topics import RECORDER_CLOSE, RECORDER_OPEN, RECORDER_STATUS
+from fras_recorder.completeness import Completeness
+from fras_recorder.contents import describe
+from fras_recorder.log_file import LogFile
+
+FLUSH_S = 0.5
+QUIET_S = 0.05
+CLOSE_TIMEOUT_S = 3.0
+
+
+class NothingToClose(FrasError):
+    """No log is open for the trial named."""
+
+
+class RecorderService:
+    """Writes what it hears; between trials it only listens."""
+
+    def __init__(self, host: ServiceHost) -> None:
+        self._host = host
+        self._file: LogFile | None = None
+        self._seen = Completeness("")
+        self._closing: Deferred[CloseRequest, CloseReply] | None = None
+        self._close_by_s = 0.0
+        self._flush_at_s = 0.0
+        self._last_arrival_s = 0.0
+        self._status = host.publisher(RECORDER_STATUS)
+        host.serve(RECORDER_OPEN, self._open)
+        host.serve_deferred(RECORDER_CLOSE, self._begin_close)
+        host.bus.subscribe_raw("**", self._on_sample)
+        self._publish("idle")
+
+    def _on_sample(self, sample: RawSample) -> None:
+        arrival_ns = time.time_ns()
+        self._host.post(lambda: self._write(sample, arrival_ns))
+
+    def _write(self, sample: RawSample, arrival_ns: int) -> None:
+        if self._file is None:
+            return
+        self._last_arrival_s = time.monotonic()
+        try:
+            header = self._file.write(sample, arrival_ns)
+        except OSError as error:
+            self._fail(error)
+            return
+        if header is None:
+            self._host.log.warning("sample without a header recorded", key=sample.key)
+        else:
+            self._seen.note(sample.key, header.trial, header.tick, header.seq)
+
+    def _open(self, request: OpenRequest) -> ResetReply:
+        self._finish("superseded")
+        metadata, attachments = describe(request)
+        path = Path(request.directory) / "audit.mcap"
+        try:
+            self._file = LogFile(path, metadata, attachments, time.time_ns())
+        except OSError as error:
+            raise FrasError(f"cannot write {path}: {error}") from error
+        self._seen = Completeness(request.trial)
+        self._host.gate.trial = request.trial
+        self._publish("recording")
+        self._host.log.info("log opened", path=str(path), trial=request.trial)
+        return ResetReply(digest=content_digest(request.trial, request.scenario, request.mesh))
+
+    def _begin_close(self, pending: Deferred[CloseRequest, CloseReply]) -> None:
+        if self._file is None or pending.request.trial != self._seen.trial:
+            pending.fail(NothingToClose(f"no log is open for trial {pending.request.trial!r}"))
+            return
+        if self._closing is not None:
+            self._closing.fail(NothingToClose("superseded by a later request to close this log"))
+        self._closing = pending
+        self._close_by_s = time.monotonic() + CLOSE_TIMEOUT_S
+
+    def wake(self) -> float | None:
+        """Flush what is due, and close when the log is complete."""
+        if self._file is None:
+            return None
+        now_s = time.monotonic()
+        if now_s >= self._flush_at_s:
+            try:
+                self._file.flush()
+            except OSError as error:
+                self._fail(error)
+                return None
+            self._flush_at_s = now_s + FLUSH_S
+        if self._closing is None:
+            return self._flush_at_s - now_s
+        request = self._closing.request
+        complete = self._seen.reached(request.last_tick, request.status_seq)
+        # Mirrors of queries may still be under way; they are not numbered by tick.
+        quiet = now_s - self._last_arrival_s >= QUIET_S
+        if (complete and quiet) or now_s >= self._close_by_s:
+            if not complete:
+                self._host.log.warning("log closed incomplete", trial=request.trial)
+            self._finish("closed")
+            return None
+        return QUIET_S
+
+    def close(self) -> None:
+        """Finish the file; the process ends."""
+        self._finish("stopped")
+
+    def _finish(self, reason: str) -> None:
+        file, self._file = self._file, None
+        pending, self._closing = self._closing, None
+        if file is None:
+            return
+        totals = {"messages": str(file.messages), "lost": str(file.lost), "reason": reason}
+        try:
+            file.close(totals)
+        except OSError as error:
+            self._file, self._closing = file, pending
+            self._fail(error)
+            return
+        self._publish("closed", file, reason)
+        if pending is not None:
+            pending.reply(CloseReply(path=str(file.path), messages=file.messages, lost=file.lost))
+
+    def _fail(self, error: OSError) -> None:
+        """Give the file up as it is: what was flushed stays readable."""
+        file, self._file = self._file, None
+        pending, self._closing = self._closing, None
+        if file is not None:
+            file.abandon()
+        self._host.log.error("log cannot be written", problem=str(error))
+        self._publish("error", file, str(error))
+        if pending is not None:
+            pending.fail(FrasError(f"log cannot be written: {error}"))
+
+    def _publish(self, state: str, file: LogFile | None = None, reason: str = "") -> None:
+        file = file or self._file
+        status = RecorderStatus(
+            trial=self._seen.trial,
+            state="idle",
+            path=str(file.path) if file else "",
+            messages=file.messages if file else 0,
+            bytes=file.bytes_written if file else 0,
+            lost=file.lost if file else 0,
+            reason=reason,
+        )
+        self._status.put(msgspec.structs.replace(status, state=state))
