@@ -1,0 +1,244 @@
+"""The `fras` command: names, options and help; what they do stands in the modules beside it."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+app = typer.Typer(
+    name="fras",
+    help="Autonomous tissue retraction: plan, watch, move, explain, record.",
+    no_args_is_help=True,
+    add_completion=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+log_app = typer.Typer(help="Look into audit logs.", no_args_is_help=True)
+scenario_app = typer.Typer(help="Make and check scenario files.", no_args_is_help=True)
+app.add_typer(log_app, name="log")
+app.add_typer(scenario_app, name="scenario")
+
+Cell = Annotated[str, typer.Option(help="Cell: stacks of different cells don't hear each other.")]
+Connect = Annotated[
+    str | None, typer.Option(help="Endpoint of a router whose stack to use, tcp/HOST:PORT.")
+]
+SERVICE_ARGUMENTS = {"allow_extra_args": True, "ignore_unknown_options": True}
+
+
+def _console(as_json: bool = False) -> Console:
+    return Console(stderr=as_json)
+
+
+@app.command()
+def run(
+    scenario: Annotated[
+        str, typer.Argument(help="A scenario file, or one that comes along: default, a, b, c.")
+    ] = "default",
+    seed: Annotated[int | None, typer.Option(help="Draw the scene from this seed.")] = None,
+    seeds: Annotated[
+        str | None, typer.Option(help="Many seeds, A..B, through one stack.", metavar="A..B")
+    ] = None,
+    pace: Annotated[
+        float | None, typer.Option(help="Simulated seconds a second; 0: as fast as possible.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="The run's own folder.", show_default="runs/<stamp>-<seed>")
+    ] = None,
+    ignore_ap: Annotated[
+        bool, typer.Option("--ignore-ap", help="First grasp nearest the ROI, attached or not.")
+    ] = False,
+    no_limit: Annotated[
+        bool, typer.Option("--no-limit", help="Switch the force limits off.")
+    ] = False,
+    criterion: Annotated[
+        str | None, typer.Option(help="sum, literal, lex, nearest or weighted.")
+    ] = None,
+    mesh: Annotated[
+        str | None, typer.Option(help="Node counts of the tissue.", metavar="NX,NY,NZ")
+    ] = None,
+    json: Annotated[
+        bool, typer.Option("--json", help="Print the summary as JSON on standard output.")
+    ] = False,
+    cell: Cell = "local",
+    connect: Connect = None,
+    port: Annotated[
+        int | None, typer.Option(help="Start an own stack with its router on this port.")
+    ] = None,
+) -> None:
+    """Run a trial: the stack of `fras up` if there is one in the cell, else an own one."""
+    from fras_cli.options import build_scenario, parse_seeds
+    from fras_cli.run import default_out, run_trials
+
+    chosen = list(parse_seeds(seeds)) if seeds is not None else [seed]
+    scenarios = [
+        build_scenario(
+            scenario,
+            seed=one,
+            pace=pace,
+            ignore_ap=ignore_ap,
+            no_limit=no_limit,
+            criterion=criterion,
+            mesh=mesh,
+        )
+        for one in chosen
+    ]
+    folder = out or default_out(seeds or str(scenarios[0].seed))
+    raise typer.Exit(
+        run_trials(
+            scenarios,
+            out=folder,
+            cell=cell,
+            connect=connect,
+            port=port,
+            console=_console(json),
+            as_json=json,
+        )
+    )
+
+
+@app.command()
+def up(
+    cell: Cell = "local",
+    port: Annotated[int, typer.Option(help="Port of the router.")] = 7447,
+    logs: Annotated[
+        Path | None, typer.Option(help="Folder of the logs.", show_default="runs/up-<cell>/logs")
+    ] = None,
+) -> None:
+    """Start the stack and keep it, for `fras run` and for clients of your own."""
+    from fras_cli.keep import up
+
+    raise typer.Exit(up(cell, port, logs or Path("runs") / f"up-{cell}" / "logs", _console()))
+
+
+@app.command()
+def down(cell: Cell = "local") -> None:
+    """Stop the stack that `fras up` keeps."""
+    from fras_cli.keep import down
+
+    raise typer.Exit(down(cell, _console()))
+
+
+@app.command()
+def status(cell: Cell = "local", connect: Connect = None) -> None:
+    """Show services, health and task of a cell."""
+    from fras_cli.keep import status
+
+    raise typer.Exit(status(cell, connect, _console()))
+
+
+@app.command()
+def stop(
+    reason: Annotated[str, typer.Option(help="Why; it stands in the audit log.")] = "stop pressed",
+    cell: Cell = "local",
+    connect: Connect = None,
+) -> None:
+    """Stop the arms now; they stay where they are until `fras resume`."""
+    from fras_cli.keep import hold
+
+    raise typer.Exit(hold(cell, connect, reason, _console()))
+
+
+@app.command()
+def resume(
+    holder: Annotated[str, typer.Option(help="Whose hold to lift.")] = "cli",
+    cell: Cell = "local",
+    connect: Connect = None,
+) -> None:
+    """Lift a hold."""
+    from fras_cli.keep import resume
+
+    raise typer.Exit(resume(cell, connect, holder, _console()))
+
+
+@app.command()
+def report(
+    log: Annotated[Path, typer.Argument(help="An audit log, or a run's folder.")],
+    out: Annotated[
+        Path | None, typer.Option(help="Where to write.", show_default="beside the log")
+    ] = None,
+) -> None:
+    """Write summary.json and report.html from an audit log alone."""
+    from fras_cli.display import print_summary
+    from fras_cli.report import write_report
+
+    path = log / "audit.mcap" if log.is_dir() else log
+    folder = out or path.parent
+    summary = write_report(path, folder)
+    print_summary(_console(), summary, [("report", str(folder / "report.html"))])
+
+
+@log_app.command("info")
+def log_info(
+    log: Annotated[Path, typer.Argument(help="An audit log, or a run's folder.")],
+) -> None:
+    """List the keys of a log with counts and rates, and how the trial ended."""
+    from fras_cli.log_info import print_info
+
+    print_info(log / "audit.mcap" if log.is_dir() else log, _console())
+
+
+@scenario_app.command("new")
+def scenario_new(
+    seed: Annotated[int, typer.Option(help="Seed of the scene.")],
+    out: Annotated[
+        Path | None, typer.Option(help="File to write.", show_default="standard output")
+    ] = None,
+    base: Annotated[str, typer.Option(help="Scenario whose other fields to take.")] = "default",
+) -> None:
+    """Draw a scene from a seed and write it as a scenario file of its own."""
+    from fras_cli.options import write_new_scenario
+
+    write_new_scenario(base, seed, out)
+
+
+@scenario_app.command("check")
+def scenario_check(
+    scenario: Annotated[str, typer.Argument(help="A scenario file.")],
+) -> None:
+    """Check a scenario file without running it."""
+    from fras_cli.options import build_scenario
+
+    checked = build_scenario(scenario)
+    _console().print(f"{scenario}: fine; seed {checked.seed}, {checked.tissue.node_counts} nodes")
+
+
+def _service(name: str, help_text: str) -> None:
+    """Register `fras <name>`: the service's own main, with its own arguments."""
+
+    @app.command(name, help=help_text, context_settings=SERVICE_ARGUMENTS, add_help_option=False)
+    def command(context: typer.Context) -> None:
+        import importlib
+
+        from fras_common.service.extras import require_extra
+
+        module = "fras_common.router" if name == "router" else f"fras_{name}.__main__"
+        with require_extra(name):
+            main = importlib.import_module(module).main
+        raise typer.Exit(main(context.args))
+
+    _ = command
+
+
+for _name, _help in {
+    "router": "Run a Zenoh router.",
+    "sim": "Run the tissue simulator.",
+    "sa": "Run situation awareness.",
+    "planner": "Run the planner and its executive.",
+    "motion": "Run motion with simulated arms.",
+    "recorder": "Run the recorder.",
+}.items():
+    _service(_name, _help)
+
+
+def main() -> None:
+    """Run the command; a known error is one line and an exit status, not a traceback."""
+    from fras_cli.failures import exit_status
+    from fras_common.errors import FrasError
+
+    try:
+        app()
+    except FrasError as error:
+        print(f"fras: {error}", file=sys.stderr)
+        sys.exit(exit_status(error))

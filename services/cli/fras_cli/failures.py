@@ -1,0 +1,53 @@
+"""Exit status of a command that ended in a known error."""
+
+from fras_cli.keep import DownTimeout
+from fras_cli.run import EXIT_BAD_INPUT, EXIT_NOT_SUCCESS, EXIT_STACK
+from fras_cli.runtime import NoStack, StackExists
+from fras_cli.stack import StackIncomplete
+from fras_cli.trial import StackDied, TrialRefused
+from fras_common.bus import NoAnswer
+from fras_common.bus.zenoh_bus import NoRouter
+from fras_common.errors import FrasError
+from fras_common.scenario import ScenarioError
+from fras_common.service.extras import MissingExtra
+from fras_supervisor import (
+    BadEndpoint,
+    CommandNotFound,
+    LogDirUnusable,
+    NotReady,
+    PortTaken,
+    ServiceDied,
+    StartCancelled,
+    TableError,
+    Unstoppable,
+)
+
+STACK_ERRORS = (
+    BadEndpoint,
+    CommandNotFound,
+    DownTimeout,
+    LogDirUnusable,
+    MissingExtra,
+    NoAnswer,
+    NoRouter,
+    NoStack,
+    NotReady,
+    PortTaken,
+    ServiceDied,
+    StackDied,
+    StackExists,
+    StackIncomplete,
+    StartCancelled,
+    TableError,
+    TrialRefused,
+    Unstoppable,
+)
+
+
+def exit_status(error: FrasError) -> int:
+    """2 for bad input, 3 for a stack that fails, 1 for the rest."""
+    if isinstance(error, ScenarioError):
+        return EXIT_BAD_INPUT
+    if isinstance(error, STACK_ERRORS):
+        return EXIT_STACK
+    return EXIT_NOT_SUCCESS

@@ -1,0 +1,152 @@
+"""`fras up|down|status|stop|resume`: a stack that stays, and what one does to it."""
+
+import signal
+import time
+from pathlib import Path
+
+import psutil
+from rich.console import Console
+from rich.table import Table
+
+from fras_cli import runtime
+from fras_cli.link import Link
+from fras_cli.run import EXIT_OK, EXIT_STACK, caught_interrupts
+from fras_cli.stack import own_stack
+from fras_common.errors import FrasError
+from fras_common.messages import Health, HoldRequest, HoldState, ResumeRequest, TaskStatus
+from fras_common.topics import HEALTH, HOLD, RESUME, SERVICES, TASK_STATUS
+
+HOLDER = "cli"
+POLL_S = 0.2
+DOWN_TIMEOUT_S = 30.0
+QUERY_TIMEOUT_S = 5.0
+STATUS_WAIT_S = 1.5
+
+
+class DownTimeout(FrasError):
+    """The stack did not end in time."""
+
+
+def up(cell: str, port: int, log_dir: Path, console: Console) -> int:
+    """Start a stack and keep it until Ctrl-C, `fras down`, or the death of a process."""
+    connect = f"tcp/127.0.0.1:{port}"
+    runtime.keep(cell, connect, log_dir)
+    try:
+        with caught_interrupts() as interrupts:
+            began_s = time.monotonic()
+            stopping = lambda: interrupts.count > 0  # noqa: E731
+            with own_stack(cell, connect, log_dir, cancelled=stopping) as stack:
+                console.print(
+                    f"ready after {time.monotonic() - began_s:.1f} s: cell {cell}, {connect}, "
+                    f"logs in {log_dir}; Ctrl-C or `fras down --cell {cell}` stops it"
+                )
+                while not stopping():
+                    if dead := stack.watch():
+                        for one in dead:
+                            console.print(f"{one}", style="bold red")
+                        return EXIT_STACK
+                    time.sleep(POLL_S)
+                console.print("stopping", style="dim")
+    finally:
+        runtime.forget(cell)
+    return EXIT_OK
+
+
+def down(cell: str, console: Console) -> int:
+    """Stop the stack that `fras up` keeps in `cell`, and wait until it is gone.
+
+    Raises
+    ------
+    NoStack
+        There is none.
+    DownTimeout
+        It did not end.
+    """
+    record = runtime.require(cell)
+    process = psutil.Process(record.pid)
+    process.send_signal(signal.SIGINT)
+    deadline_s = time.monotonic() + DOWN_TIMEOUT_S
+    # One that has ended but whose parent has not asked for its status yet counts as gone.
+    while process.is_running() and process.status() != psutil.STATUS_ZOMBIE:
+        if time.monotonic() > deadline_s:
+            raise DownTimeout(
+                f"the stack of cell {cell!r} (pid {record.pid}) still runs after "
+                f"{DOWN_TIMEOUT_S} s: look into {record.log_dir}",
+                pid=record.pid,
+            )
+        time.sleep(POLL_S)
+    console.print(f"cell {cell}: stopped")
+    return EXIT_OK
+
+
+def endpoint(cell: str, connect: str | None) -> str:
+    """Endpoint given, or that of the stack in `cell`."""
+    return connect or runtime.require(cell).connect
+
+
+def status(cell: str, connect: str | None, console: Console) -> int:
+    """Print what runs in the cell: services, their health, and the task."""
+    place = endpoint(cell, connect)
+    health: dict[str, Health] = {}
+    tasks: list[TaskStatus] = []
+    with Link(cell, place, open_timeout_s=QUERY_TIMEOUT_S) as link:
+        link.bus.subscribe(HEALTH, lambda one: health.update({one.service: one}))
+        link.bus.subscribe(TASK_STATUS, tasks.append)
+        complete = link.wait_complete(STATUS_WAIT_S)
+        deadline_s = time.monotonic() + STATUS_WAIT_S
+        while len(health) < len(SERVICES) and time.monotonic() < deadline_s:
+            time.sleep(0.05)
+        tokens = link.tokens()
+    table = Table("service", "state", "memory", "cpu", "tick", "received", "dropped", "gaps")
+    for service in SERVICES:
+        one = health.get(service)
+        if one is None:
+            seen = "ready, no health yet" if f"ready/{service}" in tokens else "absent"
+            table.add_row(service, seen)
+            continue
+        table.add_row(
+            service,
+            one.state,
+            f"{one.rss_bytes / 1e6:.0f} MB",
+            f"{one.cpu_percent:.0f} %",
+            str(one.tick) if one.tick >= 0 else "-",
+            str(one.received),
+            str(one.malformed + one.wrong_trial + one.queue_dropped),
+            str(one.gaps),
+        )
+    console.print(f"cell {cell} at {place}")
+    console.print(table)
+    if tasks:
+        task = tasks[-1]
+        console.print(
+            f"task {task.trial}: {task.phase} {task.action}{task.outcome} {task.reason}".rstrip()
+        )
+    return EXIT_OK if complete else EXIT_STACK
+
+
+def hold(cell: str, connect: str | None, reason: str, console: Console) -> int:
+    """Stop the arms: at rest within two ticks, until somebody resumes."""
+    with Link(cell, endpoint(cell, connect), open_timeout_s=QUERY_TIMEOUT_S) as link:
+        began_s = time.monotonic()
+        request = HoldRequest(holder=HOLDER, reason=reason)
+        state = link.bus.query(HOLD, request, QUERY_TIMEOUT_S)
+        took_ms = (time.monotonic() - began_s) * 1e3
+    console.print(f"stopped at tick {state.tick}, acknowledged after {took_ms:.1f} ms")
+    _print_holds(state, console)
+    return EXIT_OK
+
+
+def resume(cell: str, connect: str | None, holder: str, console: Console) -> int:
+    """Lift a hold; the executive then plans anew from where the arms stand."""
+    with Link(cell, endpoint(cell, connect), open_timeout_s=QUERY_TIMEOUT_S) as link:
+        request = ResumeRequest(holder=holder, by=HOLDER)
+        state = link.bus.query(RESUME, request, QUERY_TIMEOUT_S)
+    _print_holds(state, console)
+    return EXIT_OK
+
+
+def _print_holds(state: HoldState, console: Console) -> None:
+    if not state.holds:
+        console.print("no hold is in force")
+    for holder, reason in state.holds.items():
+        console.print(f"held by {holder}: {reason} (lift it with `fras resume --holder {holder}`)")

@@ -1,0 +1,123 @@
+"""From a file and the command line's options to one checked, resolved scenario."""
+
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from fras_common.scenario import Scenario, ScenarioError, check, load, resolve, to_toml
+from fras_common.scenario.loader import convert
+
+COMMAND_LINE = "command line"
+
+
+def find_scenario(text: str) -> Path:
+    """Path of a scenario: a file, or the name of one that comes with FRAS.
+
+    Raises
+    ------
+    ScenarioError
+        If there is neither.
+    """
+    path = Path(text)
+    if path.exists() or path.suffix == ".toml":
+        return path
+    folder = shipped_scenarios()
+    names = sorted(file.stem for file in folder.glob("*.toml"))
+    if text in names:
+        return folder / f"{text}.toml"
+    raise ScenarioError(text, "file", text, f"is neither a file nor one of: {', '.join(names)}")
+
+
+def shipped_scenarios() -> Path:
+    """Folder of the scenarios that come with FRAS: in the package, else in the checkout."""
+    import fras_supervisor
+
+    packaged = Path(fras_supervisor.__file__).parent / "compose" / "scenarios"
+    return packaged if packaged.is_dir() else packaged.parents[4] / "compose" / "scenarios"
+
+
+def parse_mesh(text: str) -> list[int]:
+    """Node counts from `NX,NY,NZ`.
+
+    Raises
+    ------
+    ScenarioError
+        If that is not three whole numbers.
+    """
+    parts = text.split(",")
+    if len(parts) != 3 or not all(part.strip().isdigit() for part in parts):
+        raise ScenarioError(COMMAND_LINE, "--mesh", text, "three node counts, as 21,25,2")
+    return [int(part) for part in parts]
+
+
+def parse_seeds(text: str) -> range:
+    """Seeds from `A..B`, both included.
+
+    Raises
+    ------
+    ScenarioError
+        If that is no range.
+    """
+    first, dots, last = text.partition("..")
+    if not dots or not first.isdigit() or not last.isdigit() or int(last) < int(first):
+        raise ScenarioError(COMMAND_LINE, "--seeds", text, "a range such as 1..20")
+    return range(int(first), int(last) + 1)
+
+
+def build_scenario(
+    file: str,
+    *,
+    seed: int | None = None,
+    pace: float | None = None,
+    ignore_ap: bool = False,
+    no_limit: bool = False,
+    criterion: str | None = None,
+    mesh: str | None = None,
+) -> Scenario:
+    """Read a scenario, lay the options over it, check it, and draw its scene if it has none.
+
+    A `seed` given here draws a new scene, also where the file holds one.
+
+    Raises
+    ------
+    ScenarioError
+        Naming the file or the command line, the key, the value and what is allowed.
+    """
+    scenario = load(find_scenario(file))
+    raw: dict[str, Any] = msgspec.to_builtins(scenario)
+    if seed is not None:
+        raw["seed"] = seed
+        raw["scene"] = None
+    if pace is not None:
+        raw["run"]["pace"] = pace
+    if ignore_ap:
+        raw["planner"]["ignore_ap"] = True
+    if no_limit:
+        raw["awareness"]["no_limit"] = True
+    if criterion is not None:
+        raw["planner"]["criterion"] = criterion
+    if mesh is not None:
+        raw["tissue"]["node_counts"] = parse_mesh(mesh)
+    return resolve(check(convert(raw, COMMAND_LINE), COMMAND_LINE))
+
+
+def write_new_scenario(base: str, seed: int, out: Path | None) -> None:
+    """Write the scenario that `seed` draws, to a file that must not exist or to standard output.
+
+    Raises
+    ------
+    ScenarioError
+        If the file exists or can't be written.
+    """
+    text = to_toml(build_scenario(base, seed=seed))
+    if out is None:
+        print(text, end="")
+        return
+    try:
+        with out.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except OSError as error:
+        raise ScenarioError(
+            COMMAND_LINE, "--out", str(out), f"cannot be written: {error}"
+        ) from error

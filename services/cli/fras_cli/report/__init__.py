@@ -1,0 +1,21 @@
+"""From a log to a summary and a report: what a trial was, for people and for programs."""
+
+from fras_cli.report.errors import ForeignLog, NoSuchLog, NotAnMcap
+from fras_cli.report.reading import read_trial
+from fras_cli.report.summary import Percentiles, Summary, summarise, to_json
+from fras_cli.report.trial import Trial
+from fras_cli.report.writing import write_picture, write_report
+
+__all__ = [
+    "ForeignLog",
+    "NoSuchLog",
+    "NotAnMcap",
+    "Percentiles",
+    "Summary",
+    "Trial",
+    "read_trial",
+    "summarise",
+    "to_json",
+    "write_picture",
+    "write_report",
+]

@@ -1,0 +1,38 @@
+"""What can be wrong with a log before there is anything to report on."""
+
+from pathlib import Path
+
+from fras_common.errors import FrasError
+
+
+class NoSuchLog(FrasError):
+    """There is no file, or it can't be opened."""
+
+    def __init__(self, path: Path, problem: str) -> None:
+        super().__init__(
+            f"{path}: cannot be read: {problem}; give the audit.mcap of a run",
+            path=path,
+            problem=problem,
+        )
+
+
+class NotAnMcap(FrasError):
+    """The file is no MCAP file at all."""
+
+    def __init__(self, path: Path, problem: str) -> None:
+        super().__init__(
+            f"{path}: is no MCAP file ({problem}); give the audit.mcap of a run",
+            path=path,
+            problem=problem,
+        )
+
+
+class ForeignLog(FrasError):
+    """An MCAP file, but not one that a FRAS recorder wrote."""
+
+    def __init__(self, path: Path, problem: str) -> None:
+        super().__init__(
+            f"{path}: is no log of FRAS: {problem}; give a file that the recorder wrote",
+            path=path,
+            problem=problem,
+        )

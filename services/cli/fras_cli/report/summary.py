@@ -1,0 +1,145 @@
+"""The numbers of a trial: `summary.json`, from its log alone."""
+
+import math
+from collections.abc import Iterable
+
+import msgspec
+import numpy as np
+
+from fras_cli.report.trial import Trial
+
+CUT_SHORT = "the log ends before the trial did"
+
+
+class Percentiles(msgspec.Struct, frozen=True, kw_only=True):
+    """Median and 99th percentile of a duration [ms]."""
+
+    p50: float
+    p99: float
+
+
+class Summary(msgspec.Struct, frozen=True, kw_only=True):
+    """One trial in numbers; None stands for what the log does not say.
+
+    Attributes
+    ----------
+    outcome : str
+        success, no_plan, aborted or failed.
+    scenario_kind : str or None
+        A: pull; B: a later plan moves; C: a later plan releases.
+    visibility : float or None
+        Share of the tissue around the region of interest lifted clear of it, at the end.
+    max_force_n : float or None
+        Over the trial, by the scenario's metric [N].
+    limit_n : float
+        The soft limit [N].
+    ticks, sim_s : int, float
+        Ticks simulated, and the same as simulated time [s].
+    wall_s : float
+        From the trial's first message to its last [s].
+    startup_s : float or None
+        From the command to the first tick [s].
+    tick_ms : Percentiles or None
+        Between consecutive ticks of one action that nobody held.
+    fe_ms : Percentiles or None
+        The finite-element step alone.
+    messages, lost : int
+        In the file, and missing in it by their numbering.
+    complete : bool
+        Whether the file is whole; else the numbers hold for what came before the cut.
+    versions : dict of str to str
+    """
+
+    outcome: str
+    reason: str
+    seed: int
+    scenario_kind: str | None
+    visibility: float | None
+    max_force_n: float | None
+    limit_n: float
+    ticks_above_limit: int
+    plans: int
+    replans: int
+    actions: list[str]
+    ticks: int
+    sim_s: float
+    wall_s: float
+    startup_s: float | None
+    tick_ms: Percentiles | None
+    fe_ms: Percentiles | None
+    messages: int
+    lost: int
+    log: str
+    complete: bool
+    versions: dict[str, str]
+
+
+def summarise(trial: Trial) -> Summary:
+    """Reduce a trial to its summary."""
+    ending = trial.ending
+    status = trial.statuses[-1] if trial.statuses else None
+    limit_n = trial.scenario.awareness.force_limit_n
+    forces = [v.max_force_n for v in trial.verdicts if math.isfinite(v.max_force_n)]
+    ticks = max((state.tick for state in trial.robot), default=0)
+    return Summary(
+        outcome=ending.outcome if ending else "aborted",
+        reason=ending.reason if ending else CUT_SHORT,
+        seed=trial.scenario.seed,
+        scenario_kind=status.scenario_kind if status else None,
+        visibility=trial.verdicts[-1].visibility if trial.verdicts else None,
+        max_force_n=max(forces, default=None),
+        limit_n=limit_n,
+        ticks_above_limit=sum(force > limit_n for force in forces),
+        plans=status.plans if status else 0,
+        replans=status.replans if status else 0,
+        actions=list(status.actions) if status else [],
+        ticks=ticks,
+        # Not 0.30000000000000004 in a file that people read.
+        sim_s=round(ticks * trial.dt_s, 9),
+        wall_s=(trial.last_ns - trial.first_ns) / 1e9,
+        startup_s=_startup_s(trial),
+        tick_ms=_percentiles(_tick_ms(trial)),
+        fe_ms=_percentiles(1e3 * tissue.wall_s for tissue in trial.tissue if tissue.tick > 0),
+        messages=trial.messages,
+        lost=trial.lost,
+        log=trial.path,
+        complete=trial.complete,
+        versions=_versions(trial),
+    )
+
+
+def to_json(summary: Summary) -> bytes:
+    """Encode as indented JSON with a final newline."""
+    return msgspec.json.format(msgspec.json.encode(summary), indent=2) + b"\n"
+
+
+def _startup_s(trial: Trial) -> float | None:
+    if not trial.started_ns or not trial.robot or trial.robot[0].tick != 0:
+        return None
+    return (trial.robot[0].stamp_ns - trial.started_ns) / 1e9
+
+
+def _tick_ms(trial: Trial) -> list[float]:
+    """Milliseconds between consecutive ticks; planning and a person's hold are no part of it."""
+    return [
+        (state.stamp_ns - before.stamp_ns) / 1e6
+        for before, state in zip(trial.robot, trial.robot[1:], strict=False)
+        if state.tick == before.tick + 1
+        and state.goal_id == before.goal_id != ""
+        and not (state.held or before.held)
+    ]
+
+
+def _percentiles(values_ms: Iterable[float]) -> Percentiles | None:
+    values = np.fromiter(values_ms, dtype=np.float64)
+    if not values.size:
+        return None
+    p50, p99 = np.percentile(values, [50, 99])
+    return Percentiles(p50=round(float(p50), 4), p99=round(float(p99), 4))
+
+
+def _versions(trial: Trial) -> dict[str, str]:
+    suffix = "_version"
+    named = {k.removesuffix(suffix): v for k, v in trial.metadata.items() if k.endswith(suffix)}
+    host = trial.metadata.get("host")
+    return named | ({"host": host} if host else {})

@@ -1,0 +1,153 @@
+"""`fras run`: one trial, or many through one stack, each with its log, summary and report."""
+
+import shutil
+import signal
+import time
+from collections.abc import Generator
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+from types import FrameType
+
+import msgspec
+from rich.console import Console
+
+from fras_cli.display import LiveDisplay, print_summary
+from fras_cli.report import Summary, write_report
+from fras_cli.stack import UsedStack, use_stack
+from fras_cli.trial import TrialFollower
+from fras_common.bus import NoAnswer
+from fras_common.scenario import Scenario, to_toml
+
+EXIT_OK, EXIT_NOT_SUCCESS, EXIT_BAD_INPUT, EXIT_STACK, EXIT_INTERRUPTED = 0, 1, 2, 3, 130
+ABORT_REASON = "interrupted at the terminal"
+
+
+class Interrupts:
+    """Counts SIGINT and SIGTERM instead of dying of them: one ends the trial, two the waiting."""
+
+    def __init__(self) -> None:
+        self.count = 0
+
+    def __call__(self, number: int, frame: FrameType | None) -> None:
+        """Count one more signal."""
+        self.count += 1
+
+
+@contextmanager
+def caught_interrupts() -> Generator[Interrupts]:
+    """Catch SIGINT and SIGTERM within the block."""
+    interrupts = Interrupts()
+    before = {name: signal.signal(name, interrupts) for name in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield interrupts
+    finally:
+        for name, handler in before.items():
+            signal.signal(name, handler)
+
+
+def default_out(seeds: str) -> Path:
+    """Folder of a run: `runs/<stamp>-<seed>`."""
+    stamp = datetime.now(UTC).strftime("%Y%m%d-%H%M%S")
+    return Path("runs") / f"{stamp}-{seeds}"
+
+
+def run_trials(
+    scenarios: list[Scenario],
+    *,
+    out: Path,
+    cell: str,
+    connect: str | None,
+    port: int | None,
+    console: Console,
+    as_json: bool,
+) -> int:
+    """Run the scenarios one after the other through one stack.
+
+    Parameters
+    ----------
+    scenarios : list of Scenario
+        Resolved.
+    out : Path
+        The run's own folder; with several scenarios each gets `seed-<n>` in it.
+    cell, connect, port
+        Which stack, see `use_stack`.
+    console : Console
+        For people.
+    as_json : bool
+        Print the summaries to standard output, one JSON object a trial.
+
+    Returns
+    -------
+    int
+        0 if every trial was a success, 1 if not, 130 if interrupted.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    single = len(scenarios) == 1
+    outcomes: list[str] = []
+    with caught_interrupts() as interrupts:
+        console.print("starting the services", style="dim")
+        with use_stack(
+            cell, connect, port, out / "logs", cancelled=lambda: interrupts.count > 0
+        ) as stack:
+            follower = TrialFollower(stack)
+            for scenario in scenarios:
+                folder = out if single else out / f"seed-{scenario.seed}"
+                summary = _one_trial(follower, scenario, folder, console, interrupts)
+                outcomes.append(summary.outcome)
+                if as_json:
+                    print(msgspec.json.encode(summary).decode(), flush=True)
+                if interrupts.count:
+                    break
+            if not stack.own:
+                _copy_logs(stack, out / "logs")
+    if not single:
+        _print_tally(console, outcomes)
+    if interrupts.count:
+        return EXIT_INTERRUPTED
+    return EXIT_OK if all(one == "success" for one in outcomes) else EXIT_NOT_SUCCESS
+
+
+def _one_trial(
+    follower: TrialFollower,
+    scenario: Scenario,
+    folder: Path,
+    console: Console,
+    interrupts: Interrupts,
+) -> Summary:
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "scenario.toml").write_text(to_toml(scenario), encoding="utf-8")
+    trial = f"{datetime.now(UTC).strftime('%Y%m%d-%H%M%S')}-{scenario.seed}"
+    console.print(f"trial {trial}: scenario {scenario.name}, seed {scenario.seed}")
+    follower.start(trial, scenario, folder)
+    with LiveDisplay(console) as display:
+        if not follower.follow(display.show, stop=lambda: interrupts.count > 0):
+            seen = interrupts.count
+            try:
+                follower.abort(ABORT_REASON)
+                follower.follow(display.show, stop=lambda: interrupts.count > seen)
+            except NoAnswer as error:
+                console.print(f"the trial could not be ended in order: {error}", style="red")
+    console.print("writing the report", style="dim")
+    began_s = time.monotonic()
+    summary = write_report(folder / "audit.mcap", folder)
+    places = [
+        ("report", str(folder / "report.html")),
+        ("audit log", str(folder / "audit.mcap")),
+        ("written in", f"{time.monotonic() - began_s:.1f} s"),
+    ]
+    print_summary(console, summary, places)
+    return summary
+
+
+def _copy_logs(stack: UsedStack, target: Path) -> None:
+    """Keep the logs of a stack that is not ours with the run."""
+    if stack.log_dir is not None and stack.log_dir.is_dir():
+        shutil.copytree(stack.log_dir, target, dirs_exist_ok=True)
+
+
+def _print_tally(console: Console, outcomes: list[str]) -> None:
+    counts = {name: outcomes.count(name) for name in dict.fromkeys(outcomes)}
+    console.print(
+        f"{len(outcomes)} trials: " + ", ".join(f"{count} {name}" for name, count in counts.items())
+    )

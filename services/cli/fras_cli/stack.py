@@ -1,0 +1,123 @@
+"""Which stack a command talks to: one that runs already, or one of its own."""
+
+import time
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from fras_cli import runtime
+from fras_cli.link import Link
+from fras_common.errors import FrasError
+from fras_supervisor import Exit, Stack, find_table, free_port, load_table
+
+COMPLETE_TIMEOUT_S = 5.0
+
+
+class StackIncomplete(FrasError):
+    """A stack is there, but some of its services are not ready."""
+
+
+@dataclass(frozen=True)
+class UsedStack:
+    """A stack that is ready.
+
+    Attributes
+    ----------
+    link : Link
+    started_ns : int
+        When its start began, or 0 if it ran before.
+    log_dir : Path or None
+        Where its services log, if that is on this machine.
+    own : bool
+        Whether this command started it.
+    watch : callable
+        Processes of an own stack that have ended.
+    """
+
+    link: Link
+    started_ns: int
+    log_dir: Path | None
+    own: bool
+    watch: Callable[[], tuple[Exit, ...]]
+
+
+@contextmanager
+def own_stack(
+    cell: str, connect: str | None, log_dir: Path, cancelled: Callable[[], bool] = lambda: False
+) -> Generator[UsedStack]:
+    """Start a stack, and stop it whatever happens.
+
+    Parameters
+    ----------
+    cell : str
+    connect : str or None
+        Endpoint of its router; a free port on the loopback if None.
+    log_dir : Path
+    cancelled : callable
+        True ends the start.
+    """
+    started_ns = time.time_ns()
+    endpoint = connect or f"tcp/127.0.0.1:{free_port()}"
+    table = load_table(find_table("local"))
+    with Link(cell, endpoint) as link:
+        stack = Stack(table, cell, endpoint, log_dir, link.tokens, cancelled=cancelled)
+        stack.start()
+        try:
+            yield UsedStack(link, started_ns, log_dir, own=True, watch=stack.watch)
+        finally:
+            link.close()
+            stack.stop()
+
+
+@contextmanager
+def running_stack(cell: str, connect: str, log_dir: Path | None) -> Generator[UsedStack]:
+    """Use a stack that runs already.
+
+    Raises
+    ------
+    StackIncomplete
+        If some of its services are not ready soon.
+    """
+    with Link(cell, connect) as link:
+        if not link.wait_complete(COMPLETE_TIMEOUT_S):
+            raise StackIncomplete(
+                f"cell {cell!r} at {connect}: not ready: {', '.join(link.missing())}",
+                missing=link.missing(),
+            )
+        yield UsedStack(link, 0, log_dir, own=False, watch=lambda: ())
+
+
+@contextmanager
+def use_stack(
+    cell: str,
+    connect: str | None,
+    port: int | None,
+    log_dir: Path,
+    cancelled: Callable[[], bool] = lambda: False,
+) -> Generator[UsedStack]:
+    """Use the stack at `connect`, else the one that `fras up` keeps in `cell`, else an own one.
+
+    Parameters
+    ----------
+    cell : str
+    connect : str or None
+        Endpoint of a router whose stack must be used.
+    port : int or None
+        Port for the router of an own stack; a stack of `fras up` is then not looked for.
+    log_dir : Path
+        Where an own stack logs.
+    cancelled : callable
+        True ends the start of an own stack.
+    """
+    kept = runtime.find(cell) if connect is None and port is None else None
+    if connect is not None:
+        with running_stack(cell, connect, None) as used:
+            yield used
+    elif kept is not None:
+        with running_stack(cell, kept.connect, Path(kept.log_dir)) as used:
+            yield used
+    else:
+        endpoint = f"tcp/127.0.0.1:{port}" if port is not None else None
+        with own_stack(cell, endpoint, log_dir, cancelled) as used:
+            yield used

@@ -1,0 +1,201 @@
+"""The `fras` command as a person uses it: real processes, real signals, real mistakes."""
+
+import json
+import os
+import signal
+import socket
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import psutil
+import pytest
+
+from fras_cli.report import Summary, read_trial, summarise
+from support.logs import assert_same_trial, messages
+
+FIELDS = set(Summary.__struct_fields__)
+Fras = Callable[..., Any]
+
+
+def summary_of(folder: Path) -> dict[str, Any]:
+    return json.loads((folder / "summary.json").read_text())
+
+
+def test_two_stacks_side_by_side_run_the_same_trial_and_hear_only_themselves(
+    fras: Fras, tmp_path: Path
+) -> None:
+    for name in ("one", "two"):
+        (tmp_path / name).mkdir()
+    commands = {
+        name: fras("run", "a", "--pace", "0", "--cell", name, "--out", name, "--json")
+        for name in ("one", "two")
+    }
+    assert {name: command.end() for name, command in commands.items()} == {"one": 0, "two": 0}
+    for name in ("one", "two"):
+        folder = tmp_path / name
+        assert set(summary_of(folder)) == FIELDS
+        assert summary_of(folder)["outcome"] == "success"
+        assert summary_of(folder)["startup_s"] < 60
+        assert (folder / "report.html").stat().st_size > 10_000
+        assert (folder / "scenario.toml").exists()
+        assert {path.stem for path in (folder / "logs").glob("*.log")} >= {"sim", "sa", "motion"}
+        states = messages(folder / "audit.mcap", "robot/state")
+        assert len({state.source for state in states}) == 1
+    assert_same_trial(tmp_path / "one" / "audit.mcap", tmp_path / "two" / "audit.mcap")
+
+
+def test_ctrl_c_in_mid_pull_leaves_a_readable_log_and_no_process(
+    fras: Fras, tmp_path: Path
+) -> None:
+    command = fras("run", "a", "--out", "out")
+    command.until("lifting")
+    assert len(command.note_family()) >= 6
+    command.process.send_signal(signal.SIGINT)
+    assert command.end() == 130
+    assert command.alone()
+    assert summary_of(tmp_path / "out")["outcome"] == "aborted"
+    assert summary_of(tmp_path / "out")["complete"]
+    assert messages(tmp_path / "out" / "audit.mcap", "motion/action_result")[-1].reason == "hold"
+    assert not list((tmp_path / "out").glob(".*"))
+
+
+def test_killed_command_leaves_no_process_and_what_was_flushed(
+    fras: Fras, tmp_path: Path, wait_until: Callable[..., Any]
+) -> None:
+    command = fras("run", "a", "--out", "out")
+    command.until("lifting")
+    command.note_family()
+    command.process.kill()
+    command.end()
+    wait_until(command.alone, "all processes gone")
+    trial = read_trial(tmp_path / "out" / "audit.mcap")
+    assert summarise(trial).outcome == "aborted"
+    assert len(trial.robot) > 50
+
+
+def test_service_that_dies_in_mid_trial_is_named_and_the_log_is_readable(
+    fras: Fras, tmp_path: Path
+) -> None:
+    command = fras("run", "a", "--out", "out")
+    command.until("lifting")
+    simulator = next(one for one in command.note_family() if "fras_sim" in one.cmdline())
+    simulator.kill()
+    assert command.end() == 3
+    assert "sim" in command.text.splitlines()[-1]
+    assert command.alone()
+    assert len(read_trial(tmp_path / "out" / "audit.mcap").robot) > 50
+
+
+BAD_SCENARIOS = {
+    "[tissue]\nyoung_modulus_kpa = 3\n": ("tissue.young_modulus_kpa", "young_modulus_pa"),
+    "[tissue]\nsize_m = [100, 120, 5]\n": ("tissue.size_m", "<= 1.0"),
+    "[tissue]\nnode_counts = [1, 1, 1]\n": ("tissue.node_counts", ">= 2"),
+    "[scene]\nroi_m = [0.2, 0.06, 0.0]\n": ("scene.roi_m", "0.1"),
+    "[planner]\ncriterion = 'best'\n": ("planner.criterion", "weighted"),
+    "pace = 1\n": ("pace", "unknown key"),
+    "[run\n": ("file", "not TOML"),
+}
+
+
+@pytest.mark.parametrize("text", BAD_SCENARIOS, ids=lambda text: text.replace("\n", " "))
+def test_bad_scenario_is_named_before_anything_starts(
+    fras: Fras, tmp_path: Path, text: str
+) -> None:
+    (tmp_path / "bad.toml").write_text(text)
+    command = fras("run", "bad.toml", "--out", "out")
+    assert command.end() == 2
+    key, hint = BAD_SCENARIOS[text]
+    assert "bad.toml" in command.text
+    assert key in command.text
+    assert hint in command.text
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [("--mesh", "21,25"), ("--seeds", "3"), ("--pace", "-1"), ("nowhere.toml",), ("nothing",)],
+)
+def test_bad_option_is_named_before_anything_starts(
+    fras: Fras, tmp_path: Path, arguments: tuple[str, ...]
+) -> None:
+    command = fras("run", *arguments, "--out", "out")
+    assert command.end() == 2
+    assert arguments[-1] in command.text
+    assert not (tmp_path / "out").exists()
+
+
+def test_taken_port_is_named(fras: Fras) -> None:
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        listener.listen()
+        port = listener.getsockname()[1]
+        command = fras("run", "a", "--port", str(port))
+        assert command.end() == 3
+    assert str(port) in command.text
+    assert not psutil.Process(os.getpid()).children()[1:] or command.alone()
+
+
+def test_missing_extra_is_named_and_everything_stopped(
+    fras: Fras, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "clingo.py").write_text("raise ModuleNotFoundError('none', name='clingo')\n")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    command = fras("run", "a")
+    assert command.end() == 3
+    assert "fras[planner]" in command.text
+
+
+def test_up_status_stop_resume_run_down(fras: Fras, tmp_path: Path) -> None:
+    from fras_supervisor import free_port
+
+    stack = fras("up", "--cell", "here", "--port", str(free_port()))
+    stack.until("ready after")
+    stack.note_family()
+    status = fras("status", "--cell", "here")
+    assert status.end() == 0
+    assert status.text.count("ready") == 5
+    again = fras("up", "--cell", "here")
+    assert again.end() == 3
+    assert "has a stack already" in again.text
+    many = fras("run", "--seeds", "1..2", "--pace", "0", "--cell", "here", "--out", "out", "--json")
+    assert many.end() == 0
+    assert [json.loads(one)["seed"] for one in many.text.splitlines() if one[0] == "{"] == [1, 2]
+    assert summary_of(tmp_path / "out" / "seed-2")["outcome"] == "success"
+    stop = fras("stop", "--cell", "here", "--reason", "look first")
+    assert stop.end() == 0
+    assert "held by cli: look first" in stop.text
+    resume = fras("resume", "--cell", "here")
+    assert resume.end() == 0
+    assert "no hold" in resume.text
+    down = fras("down", "--cell", "here")
+    assert down.end() == 0
+    assert stack.end() == 0
+    assert stack.alone()
+    assert fras("down", "--cell", "here").end() == 3
+
+
+def test_scenario_new_is_one_that_runs_the_same(fras: Fras, tmp_path: Path) -> None:
+    new = fras("scenario", "new", "--seed", "11", "--out", "mine.toml")
+    assert new.end() == 0
+    check = fras("scenario", "check", "mine.toml")
+    assert check.end() == 0
+    assert "seed 11" in check.text
+    assert fras("scenario", "new", "--seed", "12", "--out", "mine.toml").end() == 2
+    assert "seed = 11" in (tmp_path / "mine.toml").read_text()
+
+
+def test_log_info_and_report_from_the_log_alone(fras: Fras, trials: Any, tmp_path: Path) -> None:
+    summary, log = trials.run("a")
+    info = fras("log", "info", str(log))
+    assert info.end() == 0
+    assert "sim/tissue_state" in info.text
+    assert f"{summary.messages} messages, 0 lost" in info.text
+    report = fras("report", str(log), "--out", "again")
+    assert report.end() == 0
+    again = summary_of(tmp_path / "again")
+    assert again["actions"] == summary.actions
+    assert again["messages"] == summary.messages
+    missing = fras("log", "info", "nothing.mcap")
+    assert missing.end() == 1
+    assert "nothing.mcap" in missing.text
