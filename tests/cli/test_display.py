@@ -1,0 +1,74 @@
+"""What a person reads while a trial runs."""
+
+import io
+
+from rich.console import Console
+
+from fras_cli.display import LiveDisplay, action_line, bar, render
+from fras_cli.trial import TrialView
+from fras_common.messages import TaskStatus, Verdict
+from fras_common.messages.planner import TaskPhase
+
+
+def task(phase: TaskPhase, action: str = "", goal_id: str = "") -> TaskStatus:
+    return TaskStatus(
+        phase=phase,
+        action=action,
+        goal_id=goal_id,
+        tried=[],
+        plans=1,
+        replans=0,
+        scenario_kind="A",
+        actions=[],
+        outcome="",
+        reason="",
+    )
+
+
+def test_action_in_words() -> None:
+    assert action_line(TrialView()) == "starting the trial"
+    assert action_line(TrialView(task=task("planning"))) == "planning"
+    pulling = TrialView(task=task("acting", "pull(psm2,b(1,6))", "g3"))
+    assert action_line(pulling) == "action 3: psm2 lifting b(1,6)"
+    releasing = TrialView(task=task("acting", "release(psm1)", "g4"))
+    assert action_line(releasing) == "action 4: psm1 releasing"
+
+
+def test_bars_stay_in_their_frame() -> None:
+    assert len({len(bar(fraction)) for fraction in (-1.0, 0.0, 0.4, 1.0, 9.0)}) == 1
+    assert "·" not in bar(9.0)
+
+
+def test_view_shows_force_against_limit_and_who_is_waited_for() -> None:
+    verdict = Verdict(
+        level="soft",
+        ok=False,
+        reason="force_soft",
+        max_force_n=0.51,
+        limit_n=0.5,
+        hard_limit_n=1.0,
+        visibility=0.42,
+        visible=False,
+        max_height=[],
+        max_node_speed_m_s=0.0,
+        grasped={},
+    )
+    view = TrialView(
+        task=task("acting", "pull(psm2,b(1,6))", "g3"),
+        verdict=verdict,
+        waiting={"motion": "waiting: sim"},
+    )
+    output = io.StringIO()
+    Console(file=output, width=100).print(render(view))
+    assert "0.51 N of 0.50 N" in output.getvalue()
+    assert "42.0%" in output.getvalue()
+    assert "motion waiting: sim" in output.getvalue()
+
+
+def test_without_a_terminal_each_change_is_one_line() -> None:
+    output = io.StringIO()
+    with LiveDisplay(Console(file=output, width=100)) as display:
+        for _ in range(3):
+            display.show(TrialView(task=task("planning")))
+        display.show(TrialView(task=task("ended")))
+    assert output.getvalue() == "planning\nended, closing the log\n"

@@ -1,0 +1,231 @@
+"""Motion's shell on an in-memory bus: interlock, patience, holds, refusals."""
+
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from fras_common.bus import MemoryBus, MemoryFabric, RemoteFault
+from fras_common.errors import FrasError
+from fras_common.messages import (
+    ActionResult,
+    ExecuteReply,
+    ExecuteRequest,
+    HoldRequest,
+    HoldState,
+    ResetRequest,
+    ResumeRequest,
+    RobotState,
+    Verdict,
+)
+from fras_common.scenario import RunSection, Scenario, resolve
+from fras_common.service import ServiceHost
+from fras_common.topics import (
+    ACTION_RESULT,
+    EXECUTE,
+    HOLD,
+    MOTION_RESET,
+    RESUME,
+    ROBOT_STATE,
+    VERDICT,
+)
+from fras_motion.service import MotionService
+
+TARGET = (0.03, 0.03, 0.005)
+
+
+class Bench:
+    """The service, driven by hand, and a client that hears it and plays SA."""
+
+    def __init__(self) -> None:
+        fabric = MemoryFabric()
+        self.client = MemoryBus(fabric, "cell", "sa/test")
+        self.host = ServiceHost("motion")
+        self.host.attach(MemoryBus(fabric, "cell", "motion/test"))
+        self.service = MotionService(self.host)
+        self.states: list[RobotState] = []
+        self.results: list[ActionResult] = []
+        self.client.subscribe(ROBOT_STATE, self.states.append)
+        self.client.subscribe(ACTION_RESULT, self.results.append)
+        self._verdicts = self.client.publisher(VERDICT)
+
+    def ask(self, query: Any, request: Any) -> Any:
+        """Ask, let the loop handle it, and return the answer or raise."""
+        answers: list[Any] = []
+        self.client.ask(query, request, answers.append, 5.0)
+        self.settle()
+        (answer,) = answers
+        if isinstance(answer, FrasError):
+            raise answer
+        return answer
+
+    def settle(self) -> float | None:
+        """Handle everything in the inbox; returns what the service then waits for."""
+        wait_s = self.service.wake()
+        while self.host.drain(0.0):
+            wait_s = self.service.wake()
+        return wait_s
+
+    def reset(self, trial: str = "t", **run: Any) -> None:
+        scenario = resolve(Scenario(run=RunSection(pace=0, **run)))
+        self.ask(MOTION_RESET, ResetRequest(trial=trial, scenario=scenario))
+
+    def reach(self, goal_id: str = "g1", trial: str = "t", **changes: Any) -> ExecuteReply:
+        fields: dict[str, Any] = {"name": "reach", "arm": "psm1", "target_m": TARGET, **changes}
+        request = ExecuteRequest(trial=trial, goal_id=goal_id, block="b(2,2)", **fields)
+        return self.ask(EXECUTE, request)
+
+    def judge(self, tick: int, trial: str = "t", level: Any = "ok") -> float | None:
+        self._verdicts.put(
+            Verdict(
+                tick=tick,
+                trial=trial,
+                level=level,
+                ok=level == "ok",
+                reason="",
+                max_force_n=0.0,
+                limit_n=0.5,
+                hard_limit_n=1.0,
+                visibility=0.0,
+                visible=False,
+                max_height=[],
+                max_node_speed_m_s=0.0,
+                grasped={},
+            )
+        )
+        return self.settle()
+
+    def judge_until_result(self) -> ActionResult:
+        while not self.results:
+            self.judge(self.states[-1].tick)
+        return self.results[-1]
+
+
+@pytest.fixture
+def bench() -> Iterator[Bench]:
+    made = Bench()
+    yield made
+    made.host.bus.close()
+    made.client.close()
+
+
+def test_no_tick_without_the_verdict_on_the_present_one(bench: Bench) -> None:
+    bench.reset()
+    assert [state.tick for state in bench.states] == [0]
+    assert bench.reach().accepted
+    assert [state.tick for state in bench.states] == [0]
+    bench.judge(0)
+    assert [state.tick for state in bench.states] == [0, 1]
+    bench.settle()
+    bench.judge(0)
+    bench.judge(7)
+    assert [state.tick for state in bench.states] == [0, 1]
+    bench.judge(1)
+    assert [state.tick for state in bench.states] == [0, 1, 2]
+    assert [state.verdict_tick for state in bench.states] == [-1, 0, 1]
+
+
+def test_verdict_for_another_trial_moves_nothing_and_is_counted(bench: Bench) -> None:
+    bench.reset()
+    bench.reach()
+    bench.judge(0, trial="yesterday")
+    assert len(bench.states) == 1
+    bench.reset("t2")
+    assert bench.host.gate.dropped == 1
+
+
+def test_whole_reach_succeeds_and_time_then_stands_still(bench: Bench) -> None:
+    bench.reset()
+    bench.reach()
+    result = bench.judge_until_result()
+    assert (result.outcome, result.goal_id) == ("succeeded", "g1")
+    assert result.tick == bench.states[-1].tick
+    bench.judge(result.tick)
+    assert bench.states[-1].tick == result.tick
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"trial": "yesterday"}, "another_trial"),
+        ({"name": "fly"}, "unknown_action"),
+        ({"arm": "psm3"}, "unknown_arm"),
+        ({"target_m": None}, "target_missing"),
+        ({"target_m": (0.5, 0.03, 0.005)}, "workspace"),
+    ],
+)
+def test_bad_goal_is_refused_by_name(bench: Bench, changes: dict[str, Any], reason: str) -> None:
+    bench.reset()
+    reply = bench.reach(**changes)
+    assert not reply.accepted
+    assert reply.reason == reason
+    bench.judge(0)
+    assert len(bench.states) == 1
+
+
+def test_goal_before_any_reset_is_refused(bench: Bench) -> None:
+    assert bench.reach().reason == "another_trial"
+
+
+def test_hold_is_answered_before_the_loop_gets_to_it(bench: Bench) -> None:
+    bench.reset()
+    bench.reach()
+    for tick in range(40):
+        bench.judge(tick)
+    answers: list[HoldState] = []
+    request = HoldRequest(holder="monitor", reason="stop pressed")
+    bench.client.ask(HOLD, request, answers.append, 5.0)  # type: ignore[arg-type]
+    assert answers[0].holds == {"monitor": "stop pressed"}  # the loop has not run since
+    for tick in range(40, 46):
+        bench.judge(tick)
+    stopped = bench.states[-1]
+    assert stopped.tick <= 43
+    assert stopped.holds == {"monitor": "stop pressed"}
+    assert stopped.action is not None
+    with pytest.raises(RemoteFault, match="NotYourHold"):
+        bench.ask(RESUME, ResumeRequest(holder="monitor", by="executive"))
+    with pytest.raises(RemoteFault, match="UnknownHold"):
+        bench.ask(RESUME, ResumeRequest(holder="cli", by="cli"))
+    assert bench.ask(RESUME, ResumeRequest(holder="monitor", by="cli")).holds == {}
+    bench.judge(stopped.tick)
+    assert (bench.results[-1].outcome, bench.results[-1].reason) == ("interrupted", "hold")
+
+
+def test_hold_outlives_a_reset(bench: Bench) -> None:
+    bench.reset()
+    bench.ask(HOLD, HoldRequest(holder="cli", reason="wait"))
+    bench.reset("t2")
+    assert bench.reach(trial="t2").accepted
+    bench.judge(0, trial="t2")
+    assert bench.states[-1].tick == 0
+    assert bench.states[-1].holds == {"cli": "wait"}
+
+
+@pytest.mark.parametrize(
+    ("run", "held", "reason"),
+    [
+        ({"peer_timeout_s": 0.05}, False, "hold:sim"),
+        ({"hold_timeout_s": 0.05}, True, "hold:cli:look"),
+    ],
+)
+def test_patience_ends_and_says_who_was_waited_for(
+    bench: Bench, run: dict[str, Any], held: bool, reason: str
+) -> None:
+    bench.reset(**run)
+    bench.judge(0)
+    if held:
+        bench.ask(HOLD, HoldRequest(holder="cli", reason="look"))
+    bench.reach()
+    deadline_s = time.monotonic() + 10
+    while not bench.results and time.monotonic() < deadline_s:
+        bench.settle()
+    assert (bench.results[-1].outcome, bench.results[-1].reason) == ("aborted", reason)
+
+
+def test_reset_with_impossible_numbers_is_a_typed_fault(bench: Bench) -> None:
+    from fras_common.scenario import MotionSection
+
+    scenario = resolve(Scenario(motion=MotionSection(free_speed_m_s=0.4)))
+    with pytest.raises(RemoteFault, match="free_speed_m_s"):
+        bench.ask(MOTION_RESET, ResetRequest(trial="t", scenario=scenario))

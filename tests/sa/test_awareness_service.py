@@ -1,0 +1,214 @@
+"""Situation awareness's shell on an in-memory bus: joins by tick, answers when it can."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fras_common.bus import MemoryBus, MemoryFabric, RemoteFault
+from fras_common.errors import FrasError
+from fras_common.messages import (
+    Array,
+    ContextRequest,
+    ResetRequest,
+    SolverReport,
+    TargetRequest,
+    TissueModel,
+    TissueState,
+    Verdict,
+)
+from fras_common.scenario import Scenario, SceneSection
+from fras_common.service import ServiceHost
+from fras_common.topics import (
+    ROBOT_STATE,
+    SA_CONTEXT,
+    SA_RESET,
+    SA_TARGET,
+    TISSUE_MODEL,
+    TISSUE_STATE,
+    VERDICT,
+)
+from fras_sa.join import TickJoin
+from fras_sa.service import AwarenessService
+from support.robots import robot
+
+CORNERS = np.array(
+    [[x, y, z] for z in (0.0, 0.005) for y in (0.0, 0.12) for x in (0.0, 0.1)], dtype=np.float64
+)
+FACES = np.array(
+    [
+        *([0, 2, 1], [1, 2, 3], [4, 5, 6], [5, 7, 6], [0, 1, 4], [1, 5, 4]),
+        *([2, 6, 3], [3, 6, 7], [0, 4, 2], [2, 4, 6], [1, 3, 5], [3, 7, 5]),
+    ]
+)
+
+
+def tissue(tick: int, force_n: float = 0.0, converged: bool = True, **header: Any) -> TissueState:
+    fields: dict[str, Any] = {"trial": "t", **header}
+    return TissueState(
+        tick=tick,
+        nodes_m=Array.of(CORNERS, "<f4"),
+        nodal_force_n=Array.of(np.zeros_like(CORNERS), "<f4"),
+        max_force_n=force_n,
+        max_node_speed_m_s=0.0,
+        tool_force_n={},
+        grasped={"psm1": [1, 2]},
+        solver=SolverReport(
+            iterations=1,
+            residual=0.0,
+            refactored=False,
+            wall_s=0.0,
+            converged=converged,
+            inverted_elements=0,
+        ),
+        **fields,
+    )
+
+
+class Bench:
+    """The service, driven by hand, and a client that plays sim and motion."""
+
+    def __init__(self) -> None:
+        fabric = MemoryFabric()
+        self.client = MemoryBus(fabric, "cell", "sim/test")
+        self.host = ServiceHost("sa")
+        self.host.attach(MemoryBus(fabric, "cell", "sa/test"))
+        self.service = AwarenessService(self.host)
+        self.verdicts: list[Verdict] = []
+        self.client.subscribe(VERDICT, self.verdicts.append)
+        self.model = self.client.publisher(TISSUE_MODEL)
+        self.tissue = self.client.publisher(TISSUE_STATE)
+        self.robot = self.client.publisher(ROBOT_STATE)
+
+    def settle(self) -> None:
+        while self.host.drain(0.0):
+            pass
+
+    def ask(self, query: Any, request: Any) -> list[Any]:
+        answers: list[Any] = []
+        self.client.ask(query, request, answers.append, 5.0)
+        self.settle()
+        return answers
+
+    def reset(self, trial: str = "t") -> None:
+        scene = SceneSection(roi_m=(0.05, 0.06, 0.0))
+        self.ask(SA_RESET, ResetRequest(trial=trial, scenario=Scenario(scene=scene)))
+        self.model.put(
+            TissueModel(
+                trial=trial,
+                tick=0,
+                nodes_m=Array.of(CORNERS, "<f8"),
+                elements=Array.of(np.arange(8)[None], "<i4"),
+                surface=Array.of(FACES, "<i4"),
+                fixed_nodes=Array.of(np.zeros(0), "<i4"),
+                fixed_points_m=Array.of(np.zeros((0, 3)), "<f8"),
+                roi_m=(0.05, 0.06, 0.0),
+                young_modulus_pa=3000.0,
+                poisson_ratio=0.45,
+                dt_s=0.02,
+            )
+        )
+        self.settle()
+
+    def tick(self, number: int, **options: Any) -> None:
+        self.tissue.put(tissue(number, **options))
+        self.robot.put(robot(number))
+        self.settle()
+
+
+@pytest.fixture
+def bench() -> Iterator[Bench]:
+    made = Bench()
+    yield made
+    made.host.bus.close()
+    made.client.close()
+
+
+def test_join_waits_for_both_and_keeps_the_order() -> None:
+    join = TickJoin()
+    join.add(tissue(1))
+    join.add(robot(1))
+    assert join.take() is None
+    join.add(robot(0))
+    assert join.take() is None
+    join.add(tissue(0))
+    taken = [join.take(), join.take()]
+    assert [moment.tissue.tick for moment in taken if moment] == [0, 1]
+    join.add(tissue(0))
+    join.add(robot(0))
+    assert join.take() is None
+
+
+@pytest.mark.parametrize("first", ["tissue", "robot"])
+def test_one_verdict_a_tick_whatever_comes_first(bench: Bench, first: str) -> None:
+    bench.reset()
+    if first == "tissue":
+        bench.tissue.put(tissue(0))
+        bench.settle()
+        assert bench.verdicts == []
+        bench.robot.put(robot(0))
+    else:
+        bench.robot.put(robot(0))
+        bench.settle()
+        assert bench.verdicts == []
+        bench.tissue.put(tissue(0))
+    bench.settle()
+    assert [(verdict.tick, verdict.level) for verdict in bench.verdicts] == [(0, "ok")]
+    assert bench.verdicts[0].grasped == {"psm1": 2}
+
+
+def test_states_that_overtake_reset_and_model_are_judged_after_them(bench: Bench) -> None:
+    bench.tick(0)
+    assert bench.verdicts == []
+    bench.reset()
+    assert [verdict.tick for verdict in bench.verdicts] == [0]
+
+
+def test_levels_reach_the_wire(bench: Bench) -> None:
+    bench.reset()
+    bench.tick(0)
+    bench.tick(1, force_n=1.5)
+    bench.tick(2, converged=False)
+    assert [(v.level, v.ok) for v in bench.verdicts] == [
+        ("ok", True),
+        ("hard", False),
+        ("invalid", False),
+    ]
+    assert bench.verdicts[1].hard_limit_n == 1.0
+
+
+def test_context_is_answered_when_its_tick_is_there(bench: Bench) -> None:
+    bench.reset()
+    bench.tick(0)
+    waiting = bench.ask(SA_CONTEXT, ContextRequest(request_id="c1", min_tick=1))
+    assert waiting == []
+    bench.tick(1)
+    (context,) = waiting
+    assert (context.tick, context.request_id) == (1, "c1")
+    assert "above_roi(b(4,4))" in context.fluents
+    assert len(context.names) == 49
+    assert {"visible_roi", "force"} <= context.evidence.keys()
+
+
+def test_context_of_a_trial_that_ended_is_a_typed_fault(bench: Bench) -> None:
+    bench.reset()
+    waiting = bench.ask(SA_CONTEXT, ContextRequest(request_id="c1", min_tick=9))
+    bench.reset("t2")
+    assert isinstance(waiting[0], RemoteFault)
+    assert waiting[0].remote_kind == "NothingKnown"
+
+
+def test_targets(bench: Bench) -> None:
+    (early,) = bench.ask(SA_TARGET, TargetRequest(action="reach", arm="psm1", block="b(4,4)"))
+    assert isinstance(early, FrasError)
+    bench.reset()
+    bench.tick(0)
+    (reach,) = bench.ask(SA_TARGET, TargetRequest(action="reach", arm="psm1", block="b(4,4)"))
+    assert reach.position_m == pytest.approx((0.05, 0.06, 0.005), abs=1e-6)
+    (move,) = bench.ask(SA_TARGET, TargetRequest(action="move", arm="psm1", block="b(4,4)"))
+    assert move.position_m == pytest.approx((0.05, 0.06, 0.06), abs=1e-6)
+    (pull,) = bench.ask(SA_TARGET, TargetRequest(action="pull", arm="psm1", block="b(4,4)"))
+    assert pull.position_m is None
+    (unknown,) = bench.ask(SA_TARGET, TargetRequest(action="reach", arm="psm1", block="b(9,9)"))
+    assert unknown.remote_kind == "UnknownName"

@@ -1,0 +1,154 @@
+"""The simulator's shell on an in-memory bus: one state in, one out, idempotent, never guessing."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from structlog.testing import capture_logs
+
+from fras_common.bus import MemoryBus, MemoryFabric, RemoteFault
+from fras_common.codec import content_digest
+from fras_common.errors import FrasError
+from fras_common.messages import ResetRequest, TissueModel, TissueState
+from fras_common.scenario import Disc, Scenario, SceneSection, TissueSection
+from fras_common.service import ServiceHost
+from fras_common.topics import ROBOT_STATE, SIM_RESET, TISSUE_MODEL, TISSUE_STATE
+from fras_sim.service import SimService
+from support.robots import robot
+
+SCENE = SceneSection(roi_m=(0.05, 0.06, 0.0), discs=(Disc(center_m=(0.02, 0.09), radius_m=0.02),))
+SMALL = TissueSection(node_counts=(6, 7, 2))
+
+
+class Bench:
+    """The service, driven by hand, and a client that plays the robot."""
+
+    def __init__(self) -> None:
+        fabric = MemoryFabric()
+        self.client = MemoryBus(fabric, "cell", "motion/test")
+        self.host = ServiceHost("sim")
+        self.host.attach(MemoryBus(fabric, "cell", "sim/test"))
+        self.service = SimService(self.host)
+        self.models: list[TissueModel] = []
+        self.states: list[TissueState] = []
+        self.client.subscribe(TISSUE_MODEL, self.models.append)
+        self.client.subscribe(TISSUE_STATE, self.states.append)
+        self.robot = self.client.publisher(ROBOT_STATE)
+
+    def settle(self) -> None:
+        while self.host.drain(0.0):
+            pass
+
+    def put(self, *arguments: Any, **options: Any) -> None:
+        self.robot.put(robot(*arguments, **options))
+        self.settle()
+
+    def reset(self, trial: str = "t", scenario: Scenario | None = None) -> Any:
+        request = ResetRequest(
+            trial=trial, scenario=scenario or Scenario(tissue=SMALL, scene=SCENE)
+        )
+        answers: list[Any] = []
+        self.client.ask(SIM_RESET, request, answers.append, 5.0)
+        self.settle()
+        if isinstance(answers[0], FrasError):
+            raise answers[0]
+        assert answers[0].digest == content_digest(trial, request.scenario, b"")
+        return answers[0]
+
+
+@pytest.fixture
+def bench() -> Iterator[Bench]:
+    made = Bench()
+    yield made
+    made.host.bus.close()
+    made.client.close()
+
+
+def test_reset_publishes_the_tissue_at_rest(bench: Bench) -> None:
+    bench.reset()
+    (model,) = bench.models
+    assert model.nodes_m.shape == (84, 3)
+    assert model.roi_m == SCENE.roi_m
+    fixed = model.nodes_m.floats()[model.fixed_nodes.ints()]
+    assert len(fixed) > 0
+    assert (np.hypot(fixed[:, 0] - 0.02, fixed[:, 1] - 0.09) <= 0.02).all()
+    assert len(model.fixed_points_m.floats()) > len(fixed)
+
+
+def test_state_that_overtakes_the_reset_is_answered_after_it(bench: Bench) -> None:
+    bench.put(0)
+    assert bench.states == []
+    bench.reset()
+    assert [state.tick for state in bench.states] == [0]
+    assert bench.states[0].max_force_n < 1e-12
+
+
+def test_each_tick_once_in_order_and_the_same_answer_again(bench: Bench) -> None:
+    bench.reset()
+    bench.put(0)
+    bench.put(1, (0.05, 0.03, 0.055), 60.0)
+    bench.put(1, (0.05, 0.03, 0.055), 60.0)
+    assert [state.tick for state in bench.states] == [0, 1, 1]
+    first, second = bench.states[1:]
+    assert first.nodes_m == second.nodes_m
+    assert second.seq == first.seq + 1
+    bench.put(5)
+    assert len(bench.states) == 3
+    assert bench.host.counts["gaps"] >= 1
+
+
+def test_state_of_another_trial_is_no_tick(bench: Bench) -> None:
+    bench.reset()
+    bench.put(0, trial="yesterday")
+    assert bench.states == []
+    bench.reset("t2")
+    assert bench.host.gate.dropped == 1
+
+
+def test_grasp_follows_the_tool_and_is_reported(bench: Bench) -> None:
+    bench.reset()
+    top = bench.models[0].nodes_m.floats()[-1]
+    tip = (float(top[0]), float(top[1]), float(top[2]))
+    bench.put(0, (tip[0], tip[1], 0.02))
+    bench.put(1, tip, 60.0)
+    bench.put(2, tip, -20.0)
+    assert bench.states[-1].grasped["psm1"]
+    bench.put(3, (tip[0], tip[1], tip[2] + 0.002), -20.0)
+    state = bench.states[-1]
+    held = state.nodes_m.floats()[state.grasped["psm1"]]
+    assert held[:, 2].max() > 0.0065
+    assert state.max_force_n > 0
+    assert state.tool_force_n["psm1"][2] > 0
+
+
+@pytest.mark.parametrize("tip", [(float("nan"), 0.03, 0.05), (0.05, 0.03, 0.2)])
+def test_bad_tool_pose_is_refused_and_the_tissue_unchanged(bench: Bench, tip: Any) -> None:
+    bench.reset()
+    bench.put(0)
+    with capture_logs() as logs:
+        bench.put(1, tip)
+    assert len(bench.states) == 1
+    assert [entry["event"] for entry in logs] == ["tool pose refused, tissue unchanged"]
+    bench.put(1)
+    assert bench.states[-1].tick == 1
+
+
+def test_reset_recovers_and_leaves_no_trace(bench: Bench) -> None:
+    def trial(name: str) -> list[TissueState]:
+        bench.states.clear()
+        bench.reset(name)
+        for tick in range(6):
+            bench.put(
+                tick, (0.0, 0.0, 0.005 + 0.001 * tick), 60.0 if tick < 2 else -20.0, trial=name
+            )
+        return [*bench.states]
+
+    first, second = trial("t1"), trial("t2")
+    assert len(first) == 6
+    assert [state.nodes_m for state in first] == [state.nodes_m for state in second]
+
+
+def test_scenario_without_a_scene_is_a_typed_fault(bench: Bench) -> None:
+    with pytest.raises(RemoteFault, match="UnresolvedScenario"):
+        bench.reset(scenario=Scenario(tissue=SMALL))
