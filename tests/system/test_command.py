@@ -28,8 +28,8 @@ def test_two_stacks_side_by_side_run_the_same_trial_and_hear_only_themselves(
     for name in ("one", "two"):
         (tmp_path / name).mkdir()
     commands = {
-        name: fras("run", "a", "--pace", "0", "--cell", name, "--out", name, "--json")
-        for name in ("one", "two")
+        name: fras("run", "a", "--pace", pace, "--cell", name, "--out", name, "--json")
+        for name, pace in (("one", "0"), ("two", "3"))  # pacing changes nothing
     }
     assert {name: command.end() for name, command in commands.items()} == {"one": 0, "two": 0}
     for name in ("one", "two"):
@@ -173,6 +173,15 @@ def test_up_status_stop_resume_run_down(fras: Fras, tmp_path: Path) -> None:
     assert stack.end() == 0
     assert stack.alone()
     assert fras("down", "--cell", "here").end() == 3
+
+
+def test_log_is_never_written_over(fras: Fras, tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "audit.mcap").write_text("precious")
+    command = fras("run", "a", "--out", "out")
+    assert command.end() == 2
+    assert "never written over" in command.text
+    assert (tmp_path / "out" / "audit.mcap").read_text() == "precious"
 
 
 def test_scenario_new_is_one_that_runs_the_same(fras: Fras, tmp_path: Path) -> None:

@@ -54,7 +54,7 @@ class LiveDisplay:
         if self._console.is_terminal:
             self._live.update(render(view))
             return
-        line = action_line(view)
+        line = f"stopped by {view.holds}" if view.holds else action_line(view)
         if line != self._last_line:
             self._last_line = line
             self._console.print(line, highlight=False)
@@ -95,10 +95,11 @@ def render(view: TrialView) -> RenderableType:
             )
         )
     if view.robot is not None:
-        holds = "".join(f", held by {who}: {why}" for who, why in view.robot.holds.items())
         lines.append(
-            Text(f"  tick {view.robot.tick}, {view.tick_rate_hz:.0f} a second{holds}", style="dim")
+            Text(f"  tick {view.robot.tick}, {view.tick_rate_hz:.0f} a second", style="dim")
         )
+    if view.holds:
+        lines.append(Text(f"  stopped by {view.holds} (`fras resume`)", style="bold yellow"))
     lines.extend(
         Text(f"  {service} {state}", style="yellow") for service, state in view.waiting.items()
     )

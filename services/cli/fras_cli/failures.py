@@ -1,7 +1,13 @@
 """Exit status of a command that ended in a known error."""
 
 from fras_cli.keep import DownTimeout
-from fras_cli.run import EXIT_BAD_INPUT, EXIT_NOT_SUCCESS, EXIT_STACK
+from fras_cli.run import (
+    EXIT_BAD_INPUT,
+    EXIT_INTERRUPTED,
+    EXIT_NOT_SUCCESS,
+    EXIT_STACK,
+    FolderInUse,
+)
 from fras_cli.runtime import NoStack, StackExists
 from fras_cli.stack import StackIncomplete
 from fras_cli.trial import StackDied, TrialRefused
@@ -37,7 +43,6 @@ STACK_ERRORS = (
     StackDied,
     StackExists,
     StackIncomplete,
-    StartCancelled,
     TableError,
     TrialRefused,
     Unstoppable,
@@ -45,8 +50,10 @@ STACK_ERRORS = (
 
 
 def exit_status(error: FrasError) -> int:
-    """2 for bad input, 3 for a stack that fails, 1 for the rest."""
-    if isinstance(error, ScenarioError):
+    """2 for bad input, 3 for a stack that fails, 130 if interrupted, 1 for the rest."""
+    if isinstance(error, StartCancelled):
+        return EXIT_INTERRUPTED
+    if isinstance(error, (ScenarioError, FolderInUse)):
         return EXIT_BAD_INPUT
     if isinstance(error, STACK_ERRORS):
         return EXIT_STACK

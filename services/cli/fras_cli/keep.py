@@ -116,6 +116,8 @@ def status(cell: str, connect: str | None, console: Console) -> int:
         )
     console.print(f"cell {cell} at {place}")
     console.print(table)
+    if holds := health["motion"].facts.get("holds", "") if "motion" in health else "":
+        console.print(f"the arms are stopped by {holds}: lift it with `fras resume`")
     if tasks:
         task = tasks[-1]
         console.print(

@@ -17,10 +17,16 @@ from fras_cli.report import Summary, write_report
 from fras_cli.stack import UsedStack, use_stack
 from fras_cli.trial import TrialFollower
 from fras_common.bus import NoAnswer
+from fras_common.errors import FrasError
 from fras_common.scenario import Scenario, to_toml
 
 EXIT_OK, EXIT_NOT_SUCCESS, EXIT_BAD_INPUT, EXIT_STACK, EXIT_INTERRUPTED = 0, 1, 2, 3, 130
+LOG = "audit.mcap"
 ABORT_REASON = "interrupted at the terminal"
+
+
+class FolderInUse(FrasError):
+    """The folder for a trial holds the log of another one."""
 
 
 class Interrupts:
@@ -50,6 +56,31 @@ def default_out(seeds: str) -> Path:
     """Folder of a run: `runs/<stamp>-<seed>`."""
     stamp = datetime.now(UTC).strftime("%Y%m%d-%H%M%S")
     return Path("runs") / f"{stamp}-{seeds}"
+
+
+def without_hold_timeout(scenario: Scenario) -> Scenario:
+    """Let a stop last until somebody lifts it: on a stack that stays, somebody is there."""
+    run = msgspec.structs.replace(scenario.run, hold_timeout_s=0.0)
+    return msgspec.structs.replace(scenario, run=run)
+
+
+def trial_folders(scenarios: list[Scenario], out: Path) -> list[Path]:
+    """Folder of each trial: `out` itself for one, `seed-<n>` in it for several.
+
+    Raises
+    ------
+    FolderInUse
+        If one of them holds a log: a log is never written over.
+    """
+    single = len(scenarios) == 1
+    folders = [out if single else out / f"seed-{scenario.seed}" for scenario in scenarios]
+    for folder in folders:
+        if (folder / LOG).exists():
+            raise FolderInUse(
+                f"{folder / LOG} exists: a log is never written over, choose another --out",
+                path=folder / LOG,
+            )
+    return folders
 
 
 def run_trials(
@@ -82,8 +113,8 @@ def run_trials(
     int
         0 if every trial was a success, 1 if not, 130 if interrupted.
     """
+    folders = trial_folders(scenarios, out)
     out.mkdir(parents=True, exist_ok=True)
-    single = len(scenarios) == 1
     outcomes: list[str] = []
     with caught_interrupts() as interrupts:
         console.print("starting the services", style="dim")
@@ -91,8 +122,9 @@ def run_trials(
             cell, connect, port, out / "logs", cancelled=lambda: interrupts.count > 0
         ) as stack:
             follower = TrialFollower(stack)
-            for scenario in scenarios:
-                folder = out if single else out / f"seed-{scenario.seed}"
+            for scenario, folder in zip(scenarios, folders, strict=True):
+                if not stack.own:
+                    scenario = without_hold_timeout(scenario)
                 summary = _one_trial(follower, scenario, folder, console, interrupts)
                 outcomes.append(summary.outcome)
                 if as_json:
@@ -101,7 +133,7 @@ def run_trials(
                     break
             if not stack.own:
                 _copy_logs(stack, out / "logs")
-    if not single:
+    if len(scenarios) > 1:
         _print_tally(console, outcomes)
     if interrupts.count:
         return EXIT_INTERRUPTED
@@ -130,10 +162,10 @@ def _one_trial(
                 console.print(f"the trial could not be ended in order: {error}", style="red")
     console.print("writing the report", style="dim")
     began_s = time.monotonic()
-    summary = write_report(folder / "audit.mcap", folder)
+    summary = write_report(folder / LOG, folder)
     places = [
         ("report", str(folder / "report.html")),
-        ("audit log", str(folder / "audit.mcap")),
+        ("audit log", str(folder / LOG)),
         ("written in", f"{time.monotonic() - began_s:.1f} s"),
     ]
     print_summary(console, summary, places)

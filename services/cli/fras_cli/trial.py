@@ -47,6 +47,7 @@ class TrialView:
     verdict: Verdict | None = None
     robot: RobotState | None = None
     waiting: dict[str, str] = field(default_factory=dict[str, str])
+    holds: str = ""
     tick_rate_hz: float = 0.0
 
 
@@ -141,6 +142,8 @@ class TrialFollower:
             self._view.waiting.pop(health.service, None)
             if health.state.startswith("waiting"):
                 self._view.waiting[health.service] = health.state
+            if health.service == "motion":
+                self._view.holds = health.facts.get("holds", "")
 
     def _on_verdict(self, verdict: Verdict) -> None:
         # Fifty times a second: kept for the next look, waking nobody.

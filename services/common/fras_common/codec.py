@@ -4,7 +4,7 @@ import functools
 import hashlib
 import re
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import msgspec
 
@@ -58,23 +58,23 @@ def decode(kind: type[T], payload: bytes, key: str) -> T:
 
 
 class HeaderFields(msgspec.Struct):
-    """The header of any message; decoding it alone skips the rest."""
+    """The header of any message, in the ranges that a log can hold; the rest is skipped."""
 
-    stamp_ns: int = 0
-    tick: int = -1
-    seq: int = 0
-    source: str = ""
-    trial: str = ""
+    stamp_ns: Annotated[int, msgspec.Meta(ge=0)]
+    tick: int
+    seq: Annotated[int, msgspec.Meta(ge=0, lt=2**32)]
+    source: str
+    trial: str
 
 
 _header_decoder = msgspec.msgpack.Decoder(HeaderFields)
 
 
 def read_header(payload: bytes) -> HeaderFields | None:
-    """Read the header of a payload, or None where it has none."""
+    """Read the header of a payload, or None where it has none that is whole and in range."""
     try:
         return _header_decoder.decode(payload)
-    except (msgspec.DecodeError, RecursionError):
+    except (msgspec.DecodeError, ValueError, OverflowError, RecursionError):
         return None
 
 

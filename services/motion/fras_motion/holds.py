@@ -61,6 +61,10 @@ class Holds:
         with self._lock:
             return dict(self._reasons)
 
+    def in_words(self) -> str:
+        """Tell the holds in force; empty if there is none."""
+        return "; ".join(f"{holder}: {reason}" for holder, reason in self.current().items())
+
     def impose(self, controller: MotionController) -> None:
         """Make the controller's holds those in force."""
         wanted, standing = self.current(), controller.snapshot.holds

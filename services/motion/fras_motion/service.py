@@ -6,7 +6,6 @@ from fras_common.codec import content_digest
 from fras_common.messages import (
     ExecuteReply,
     ExecuteRequest,
-    Health,
     HoldRequest,
     HoldState,
     ResetReply,
@@ -19,7 +18,6 @@ from fras_common.service import ServiceHost
 from fras_common.topics import (
     ACTION_RESULT,
     EXECUTE,
-    HEALTH,
     HOLD,
     MOTION_RESET,
     RESUME,
@@ -32,6 +30,7 @@ from fras_motion.errors import Refused
 from fras_motion.holds import Holds
 from fras_motion.pacing import Pacer
 from fras_motion.patience import Patience
+from fras_motion.peers import Peers
 from fras_motion.states import ActionResult, Goal
 
 
@@ -44,12 +43,11 @@ class MotionService:
         self._controller: MotionController | None = None
         self._verdict: Verdict | None = None
         self._goal: Goal | None = None
-        self._peer_ticks: dict[str, int] = {}
+        self._peers = Peers(host)
         self._begin(Scenario())
         self._state = host.publisher(ROBOT_STATE)
         self._result = host.publisher(ACTION_RESULT)
         host.subscribe(VERDICT, self._on_verdict)
-        host.subscribe(HEALTH.of(service="sim"), self._on_peer_health)
         host.serve(MOTION_RESET, self._reset)
         host.serve(EXECUTE, self._execute)
         host.serve_at_once(HOLD, self._hold)
@@ -65,7 +63,6 @@ class MotionService:
         self._controller = controller
         self._verdict = None
         self._goal = None
-        self._peer_ticks.clear()
         self._holds.impose(controller)
         self._host.enter_trial(request.trial)
         self._publish(controller)
@@ -98,15 +95,13 @@ class MotionService:
     def _on_verdict(self, verdict: Verdict) -> None:
         self._verdict = verdict
 
-    def _on_peer_health(self, health: Health) -> None:
-        self._peer_ticks[health.service] = health.tick
-
     def wake(self) -> float | None:
         """Do the next tick if it is due; else see whether something has been missing too long."""
         controller, now_s = self._controller, time.monotonic()
         if controller is None:
             return None
         self._holds.impose(controller)
+        self._host.facts["holds"] = self._holds.in_words()
         tick, verdict = controller.snapshot.tick, self._verdict
         if controller.wants_tick and verdict is not None and verdict.tick == tick:
             self._host.waiting_for = ""
@@ -119,7 +114,8 @@ class MotionService:
         if self._goal is None:
             self._patience.rest()
             return None
-        reason = self._patience.exhausted(now_s, self._missing(controller, tick), self._holds)
+        missing = self._peers.missing(tick) if controller.wants_tick else ""
+        reason = self._patience.exhausted(now_s, missing, self._holds)
         self._host.waiting_for = self._patience.waiting_for
         if reason:
             self._finish(controller.abort(reason))
@@ -142,15 +138,6 @@ class MotionService:
             self._goal = None
             self._host.waiting_for = ""
             self._result.put(action_result(result, goal, self._host.gate.trial))
-
-    def _missing(self, controller: MotionController, tick: int) -> str:
-        """Name the service whose answer on `tick` is missing, or nobody while the arms are held."""
-        if not controller.wants_tick:
-            return ""
-        for service in ("sim", "sa"):
-            if not self._host.present(f"alive/{service}"):
-                return service
-        return "sim" if self._peer_ticks.get("sim", tick) < tick else "sa"
 
     def close(self) -> None:
         """Nothing to put in order: the arms stand at their last setpoint."""
