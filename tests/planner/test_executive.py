@@ -185,7 +185,12 @@ def after(**by_action: list[str]) -> Callable[[str], list[str]]:
     return lambda text: by_action.get(text.partition("(")[0], [])
 
 
-HELD = [f"{name}(psm1,{block})" for name in ("at", "in_hand") for block in (BLOCK, OTHER, THIRD)]
+def held(text: str) -> list[str]:
+    """Where psm1 is and what it holds after an action that went as expected."""
+    block = BLOCK if text.startswith("move") else text.partition(",")[2].removesuffix(")")
+    return [f"at(psm1,{block})", f"in_hand(psm1,{block})"]
+
+
 EXPOSED = after(
     reach=[f"at(psm1,{BLOCK})"],
     grasp=[f"in_hand(psm1,{BLOCK})"],
@@ -195,7 +200,7 @@ EXPOSED = after(
 
 def hidden_pull(*fluents: str) -> Callable[[str], list[str]]:
     """Reach and grasp as expected; the pull exposes nothing, the move does."""
-    return lambda text: [*HELD, *fluents, *(["visible_roi"] if text.startswith("move") else [])]
+    return lambda text: [*held(text), *fluents, *(["visible_roi"] * text.startswith("move"))]
 
 
 def test_a_trial_resets_in_order_and_closes_its_log() -> None:
@@ -235,20 +240,20 @@ def test_ignored_attachments_hold_for_the_first_plan_and_the_block_is_then_tried
     assert world.requests[1].tried == (BLOCK,)
 
 
-def test_hard_limit_rules_the_held_block_out() -> None:
+def test_hard_limit_rules_out_every_block_that_the_gripper_spans() -> None:
     world = World(
         [pulling(), RELEASING, []],
-        hidden_pull(),
+        hidden_pull(f"in_hand(psm1,{THIRD})", f"in_hand(psm2,{OTHER})"),
         ends={f"pull(psm1,{BLOCK})": ("interrupted", "force_hard")},
     )
     world.run()
-    assert world.requests[1].tried == (BLOCK,)
+    assert world.requests[1].tried == (BLOCK, THIRD)
 
 
 def test_move_that_does_not_expose_rules_the_held_block_out() -> None:
     world = World(
         [pulling(), MOVING, RELEASING, []],
-        lambda text: HELD,
+        held,
         ends={f"pull(psm1,{BLOCK})": ("interrupted", "force_soft")},
     )
     end = world.run()
@@ -259,7 +264,7 @@ def test_move_that_does_not_expose_rules_the_held_block_out() -> None:
 def test_grasp_of_nothing_and_refused_reach_rule_the_block_out() -> None:
     world = World(
         [pulling(), pulling(OTHER), pulling(THIRD), []],
-        lambda text: HELD,
+        held,
         ends={f"grasp(psm1,{BLOCK})": ("failed", "nothing_in_reach")},
         refuse={f"reach(psm1,{OTHER})": "unreachable"},
     )
@@ -290,7 +295,7 @@ def test_effect_that_must_not_hold_is_watched_too() -> None:
 def test_lifted_stop_is_planned_anew_and_no_failure() -> None:
     world = World(
         [pulling(), pulling(OTHER), []],
-        lambda text: [*HELD, "visible_roi"],
+        lambda text: [*held(text), "visible_roi"],
         ends={f"reach(psm1,{BLOCK})": ("interrupted", "hold")},
         planner=PlannerSection(max_replans=0),
     )

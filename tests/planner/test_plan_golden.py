@@ -73,6 +73,19 @@ def test_a_history_holds_every_atom_at_every_step(planner: Planner, scene: Plann
     assert all(scene.statics <= set(atoms) for atoms in history.values())
 
 
+def test_history_tells_where_tools_were_sensed_until_they_leave(planner: Planner) -> None:
+    state = [*held("b(7,2)"), "at(psm2,b(2,6))"]
+    history = planner.plan(state, tried=["b(7,2)"]).history
+    assert sorted(history) == [1, 2, 3, 4, 5]
+    there = [t for t, atoms in history.items() if "at(psm1,b(7,2))" in atoms]
+    holding = [t for t, atoms in history.items() if "in_hand(psm1,b(7,2))" in atoms]
+    other = [t for t, atoms in history.items() if "at(psm2,b(2,6))" in atoms]
+    tried = [t for t, atoms in history.items() if "tried(b(7,2))" in atoms]
+    assert (there, holding, other, tried) == ([1], [1], [1, 2, 3, 4, 5], [1, 2, 3, 4, 5])
+    ignoring = planner.plan([], ignore_ap=True).history
+    assert all("ignore_ap" in atoms for atoms in ignoring.values())
+
+
 def test_b_moves_sideways_at_the_limit(planner: Planner) -> None:
     plan = planner.plan([*held("b(7,3)"), "max_height(psm1)"])
     assert texts(plan) == ["move(psm1,b(5,3))"]

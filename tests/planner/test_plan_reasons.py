@@ -1,5 +1,6 @@
 """Why this plan, in words; why none: a minimal core and the facts behind it."""
 
+import re
 from collections.abc import Callable
 
 import pytest
@@ -170,6 +171,24 @@ def test_each_core_is_needed_whole(knowledge: Knowledge, make_scene: SceneMaker)
         files["constraints.lp"] = files["constraints.lp"].replace(f"{rule};", "", 1)
         lifted = Planner(Knowledge(files, ""), scene).plan([], tried=tried)
         assert lifted.no_plan is None, rule
+
+
+def test_every_rule_can_be_worded(knowledge: Knowledge) -> None:
+    pool = re.search(r"^rule\(([^)]*)\)\.", knowledge.files["constraints.lp"], re.MULTILINE)
+    assert pool is not None
+    names = {name.strip() for name in pool.group(1).split(";")}
+    worded = re.findall(r"^text\((\w+),", knowledge.files["explain.lp"], re.MULTILINE)
+    assert sorted(names) == sorted(worded)
+
+
+def test_an_arm_stuck_at_its_limit_with_the_roi_seen(
+    knowledge: Knowledge, scene: PlanningScene
+) -> None:
+    state = ["in_hand(psm1,b(2,1))", "closed_gripper(psm1)", "max_height(psm1)", "visible_roi"]
+    none = Planner(knowledge, scene, goal="clear").plan(state, tried=scene.names).no_plan
+    assert none is not None
+    assert none.core == ("end_below_limit", "see_roi", "try_once")
+    assert "Rule: No arm may end at its limit." in none.sentences
 
 
 def test_a_spent_budget_is_said_without_blaming_a_rule(

@@ -40,7 +40,8 @@ class Bench:
     def ask(self, **fields: Any) -> list[TaskReply]:
         """Ask `planner/task`; the list fills when the answer comes."""
         answers: list[TaskReply] = []
-        request = TaskRequest(**{"command": "start", "trial": "t", **fields})
+        settings: dict[str, Any] = {"command": "start", "trial": "t", **fields}
+        request = TaskRequest(**settings)
         self.client.ask(TASK, request, answers.append, 30.0)  # type: ignore[arg-type]
         while self.host.drain(0.0):
             self.service.wake()

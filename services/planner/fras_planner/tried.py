@@ -41,12 +41,14 @@ def newly_tried(
         return [target] if action.name in {"reach", "grasp"} else []
     if held is None or result.reason == "hold":
         return []
-    if result.reason == "force_hard":
-        return [held.block]
     holds = set(fluents)
-    if "visible_roi" in holds:
-        return []
     hopeless = held.ignored_ap or f"fixed({held.block})" in holds
-    if action.name == "move" or (action.name == "pull" and hopeless):
-        return [held.block]
-    return []
+    in_vain = "visible_roi" not in holds and (
+        action.name == "move" or (action.name == "pull" and hopeless)
+    )
+    if result.reason != "force_hard" and not in_vain:
+        return []
+    # On a fine grid a gripper spans several blocks; to try its neighbour would be to try it again.
+    grip = f"in_hand({action.args[0]},"
+    spanned = {atom[len(grip) : -1] for atom in holds if atom.startswith(grip)}
+    return [held.block, *sorted(spanned - {held.block})]
