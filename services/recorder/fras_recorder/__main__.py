@@ -1,12 +1,17 @@
 """`python -m fras_recorder`."""
 
+import os
 import sys
 
 from fras_common.service import run_service
 
+# The recorder hears each message at the moment when the next process of the loop has to act on it.
+NICENESS = 5
+
 
 def main(argv: list[str] | None = None) -> int:
-    """Run the recorder."""
+    """Run the recorder, behind the processes that the arms wait for."""
+    os.nice(NICENESS)
     return run_service(
         "recorder", "fras_recorder.service:RecorderService", argv, "Record all traffic to MCAP."
     )
