@@ -19,19 +19,19 @@ help: ## show this list
 install: $(VENV)/.installed ## install FRAS and all its services into .venv
 
 $(VENV)/bin/python:
-	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "FRAS needs Python 3.11 or newer: make PYTHON=...")'
-	$(PYTHON) -m venv $(VENV)
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "FRAS needs Python 3.11 or newer: make PYTHON=...")'
+	@$(PYTHON) -m venv $(VENV)
 
 $(VENV)/.installed: $(SOURCES) | $(VENV)/bin/python
 	@echo "installing FRAS into $(VENV) (a minute or two)"
-	$(PIP_INSTALL) --editable '.[all]'
+	@$(PIP_INSTALL) --editable '.[all]'
 	@echo "compiling the finite-element kernels (once, about half a minute)"
-	$(BIN)/python -c 'from fras_sim.fem import compile_kernels; compile_kernels()'
+	@$(BIN)/python -c 'from fras_sim.fem import compile_kernels; compile_kernels()'
 	@touch $@
 
 $(VENV)/.installed-dev: $(VENV)/.installed
 	@echo "installing the tools of the tests and checks"
-	$(PIP_INSTALL) --editable '.[dev]'
+	@$(PIP_INSTALL) --editable '.[dev]'
 	@touch $@
 
 run: $(VENV)/.installed ## run one complete autonomous retraction

@@ -1,8 +1,20 @@
 """`python -m fras_cli`, and the `fras` command."""
 
-from fras_cli.app import main
+import sys
 
-__all__ = ["main"]
+from fras_common.service.extras import MissingExtra, require_extra
+
+
+def main() -> None:
+    """Run the command, or say what to install for it."""
+    try:
+        with require_extra("cli"):
+            from fras_cli.app import main as run
+    except MissingExtra as error:
+        print(f"fras: {error}", file=sys.stderr)
+        sys.exit(3)
+    run()
+
 
 if __name__ == "__main__":
     main()
