@@ -119,6 +119,7 @@ def test_a_silent_server_gives_no_answer_in_time(open_bus: Open, listen: Listen)
     kept = listen()
     open_bus("sa/1").serve(SA_TARGET, kept)
     asker = open_bus("motion/1")
+    since = 0.0
     for _ in range(100):
         since = time.monotonic()
         with pytest.raises(NoAnswer) as caught:

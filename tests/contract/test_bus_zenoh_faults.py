@@ -19,8 +19,9 @@ from fras_common.topics import LOG, RECORDER_STATUS
 Listen = Callable[[], Any]
 
 SIM_LOG = LOG.of(service="sim")
-BIG = "x" * 40_000
-FROZEN_PUTS = 400
+# More than all buffers on the way hold, and less than a publisher keeps.
+BIG = "x" * 60_000
+FROZEN_PUTS = 900
 
 LISTENER = """
 import sys, threading

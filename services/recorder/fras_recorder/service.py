@@ -1,24 +1,16 @@
 """The recorder's shell: every sample of the cell into one MCAP file a trial."""
 
 import time
-from pathlib import Path
-
-import msgspec
 
 from fras_common.bus import RawSample
 from fras_common.codec import content_digest
 from fras_common.errors import FrasError
-from fras_common.messages import (
-    CloseReply,
-    CloseRequest,
-    OpenRequest,
-    RecorderStatus,
-    ResetReply,
-)
+from fras_common.messages import CloseReply, CloseRequest, OpenRequest, RecorderStatus, ResetReply
+from fras_common.messages.recorder import LogState
 from fras_common.service import Deferred, ServiceHost
 from fras_common.topics import RECORDER_CLOSE, RECORDER_OPEN, RECORDER_STATUS
 from fras_recorder.completeness import Completeness
-from fras_recorder.contents import describe
+from fras_recorder.contents import open_log
 from fras_recorder.log_file import LogFile
 
 FLUSH_S = 0.5
@@ -67,16 +59,11 @@ class RecorderService:
 
     def _open(self, request: OpenRequest) -> ResetReply:
         self._finish("superseded")
-        metadata, attachments = describe(request)
-        path = Path(request.directory) / "audit.mcap"
-        try:
-            self._file = LogFile(path, metadata, attachments, time.time_ns())
-        except OSError as error:
-            raise FrasError(f"cannot write {path}: {error}") from error
+        self._file = open_log(request, time.time_ns())
         self._seen = Completeness(request.trial)
         self._host.gate.trial = request.trial
         self._publish("recording")
-        self._host.log.info("log opened", path=str(path), trial=request.trial)
+        self._host.log.info("log opened", path=str(self._file.path), trial=request.trial)
         return ResetReply(digest=content_digest(request.trial, request.scenario, request.mesh))
 
     def _begin_close(self, pending: Deferred[CloseRequest, CloseReply]) -> None:
@@ -144,15 +131,15 @@ class RecorderService:
         if pending is not None:
             pending.fail(FrasError(f"log cannot be written: {error}"))
 
-    def _publish(self, state: str, file: LogFile | None = None, reason: str = "") -> None:
+    def _publish(self, state: LogState, file: LogFile | None = None, reason: str = "") -> None:
         file = file or self._file
         status = RecorderStatus(
             trial=self._seen.trial,
-            state="idle",
+            state=state,
             path=str(file.path) if file else "",
             messages=file.messages if file else 0,
             bytes=file.bytes_written if file else 0,
             lost=file.lost if file else 0,
             reason=reason,
         )
-        self._status.put(msgspec.structs.replace(status, state=state))
+        self._status.put(status)

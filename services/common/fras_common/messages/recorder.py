@@ -31,10 +31,13 @@ class CloseReply(Wire, frozen=True, kw_only=True):
     lost: int
 
 
+LogState = Literal["idle", "recording", "closed", "error"]
+
+
 class RecorderStatus(Header, frozen=True, kw_only=True):
     """State of the log; latched."""
 
-    state: Literal["idle", "recording", "closed", "error"]
+    state: LogState
     path: str
     messages: int
     bytes: int

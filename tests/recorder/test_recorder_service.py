@@ -1,0 +1,412 @@
+"""The recorder's shell on a bus in memory: open, listen, wait, close."""
+
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from mcap.reader import make_reader
+from mcap.records import Channel, Message
+
+from fras_common.bus import MemoryBus, MemoryFabric, RawSample, RemoteFault
+from fras_common.codec import content_digest, decode
+from fras_common.messages import (
+    CloseReply,
+    CloseRequest,
+    Header,
+    OpenRequest,
+    RecorderStatus,
+    ResetReply,
+    RobotState,
+    TaskStatus,
+    TissueState,
+    Verdict,
+)
+from fras_common.messages import base as wire
+from fras_common.messages.sim import SolverReport
+from fras_common.scenario import Scenario, to_toml
+from fras_common.service import ServiceHost
+from fras_common.topics import (
+    HEALTH,
+    RECORDER_CLOSE,
+    RECORDER_OPEN,
+    RECORDER_STATUS,
+    ROBOT_STATE,
+    TASK_STATUS,
+    TISSUE_STATE,
+    VERDICT,
+)
+from fras_recorder import service as recorder
+from fras_recorder.log_file import LogFile
+from fras_recorder.service import RecorderService
+
+WAIT_S = 10.0
+EMPTY = wire.Array(dtype="<f4", shape=(0, 3), data=b"")
+
+
+class Stage:
+    """A recorder with its loop in a thread, and someone who speaks to it."""
+
+    def __init__(self) -> None:
+        self.fabric = MemoryFabric()
+        self.host = ServiceHost("recorder")
+        self._own = MemoryBus(self.fabric, "test", "recorder/1")
+        self.host.attach(self._own)
+        self.speaker = MemoryBus(self.fabric, "test", "speaker/1")
+        self.service = RecorderService(self.host)
+        self._loop = threading.Thread(target=self.host.run, args=(self.service.wake,))
+        self._loop.start()
+        topics: Any = (ROBOT_STATE, TISSUE_STATE, VERDICT, TASK_STATUS)
+        self._publishers = {topic.key: self.speaker.publisher(topic) for topic in topics}
+        self.states: list[RecorderStatus] = []
+        self._changed = threading.Condition()
+        self.speaker.subscribe(RECORDER_STATUS, self._on_state)
+
+    def _on_state(self, status: RecorderStatus) -> None:
+        with self._changed:
+            self.states.append(status)
+            self._changed.notify_all()
+
+    def until(self, state: str) -> RecorderStatus:
+        """Wait for a state of the recorder."""
+        with self._changed:
+            found = self._changed.wait_for(
+                lambda: [status for status in self.states if status.state == state], WAIT_S
+            )
+        assert found, f"never {state}: {self.states}"
+        return found[-1]
+
+    def say(self, message: Header, key: str) -> Header:
+        return self._publishers[key].put(message)
+
+    def tick(self, number: int, trial: str = "t-1") -> None:
+        self.say(robot_state(number, trial), "robot/state")
+        self.say(tissue_state(number, trial), "sim/tissue_state")
+        self.say(verdict(number, trial), "sa/verdict")
+
+    def open(self, directory: Path, trial: str = "t-1", mesh: bytes = b"") -> ResetReply:
+        request = OpenRequest(
+            trial=trial, scenario=Scenario(seed=4), mesh=mesh, directory=str(directory)
+        )
+        return self.speaker.query(RECORDER_OPEN, request, WAIT_S)
+
+    def ask_close(self, last_tick: int, status_seq: int, trial: str = "t-1") -> "Closing":
+        closing = Closing()
+        request = CloseRequest(trial=trial, last_tick=last_tick, status_seq=status_seq)
+        self.speaker.ask(RECORDER_CLOSE, request, closing.settle, WAIT_S)
+        return closing
+
+    def settle(self) -> None:
+        """Wait until everything said so far has been handled."""
+        done = threading.Event()
+        self.host.post(done.set)
+        assert done.wait(WAIT_S)
+
+    def end(self) -> None:
+        self.host.stop()
+        self._loop.join(WAIT_S)
+        assert not self._loop.is_alive()
+        self.service.close()
+        self._own.close()
+        self.speaker.close()
+
+
+class Closing:
+    """The outcome of a close, when it comes."""
+
+    def __init__(self) -> None:
+        self._done = threading.Event()
+        self.outcomes: list[Any] = []
+
+    def settle(self, outcome: Any) -> None:
+        self.outcomes.append(outcome)
+        self._done.set()
+
+    def wait(self, timeout_s: float = WAIT_S) -> Any:
+        assert self._done.wait(timeout_s), "no answer"
+        return self.outcomes[0]
+
+
+def robot_state(tick: int, trial: str) -> RobotState:
+    return RobotState(tick=tick, trial=trial, arms={}, action=None, holds={}, verdict_tick=tick - 1)
+
+
+def tissue_state(tick: int, trial: str) -> TissueState:
+    solver = SolverReport(
+        iterations=1, residual=0.0, refactored=False, wall_s=0.0, converged=True,
+        inverted_elements=0,
+    )  # fmt: skip
+    return TissueState(
+        tick=tick, trial=trial, nodes_m=EMPTY, nodal_force_n=EMPTY, max_force_n=0.0,
+        max_node_speed_m_s=0.0, tool_force_n={}, grasped={}, solver=solver,
+    )  # fmt: skip
+
+
+def verdict(tick: int, trial: str) -> Verdict:
+    return Verdict(
+        tick=tick, trial=trial, level="ok", ok=True, reason="", max_force_n=0.0, limit_n=0.5,
+        hard_limit_n=1.0, visibility=0.0, visible=False, max_height=[], max_node_speed_m_s=0.0,
+        grasped={},
+    )  # fmt: skip
+
+
+def task_status(trial: str = "t-1") -> TaskStatus:
+    return TaskStatus(
+        trial=trial, phase="ended", action="", goal_id="", tried=[], plans=1, replans=0,
+        scenario_kind="A", actions=[], outcome="success", reason="",
+    )  # fmt: skip
+
+
+@pytest.fixture
+def stage() -> Iterator[Stage]:
+    stage = Stage()
+    yield stage
+    stage.end()
+
+
+def recorded(path: Path) -> dict[str, list[int]]:
+    with path.open("rb") as stream:
+        found: dict[str, list[int]] = {}
+        entry: tuple[Any, Channel, Message]
+        for entry in make_reader(stream, validate_crcs=True).iter_messages():
+            found.setdefault(entry[1].topic, []).append(entry[2].sequence)
+    return found
+
+
+def metadata(path: Path) -> dict[str, dict[str, str]]:
+    with path.open("rb") as stream:
+        return {record.name: record.metadata for record in make_reader(stream).iter_metadata()}
+
+
+def test_a_trial_is_recorded_from_open_to_close(stage: Stage, tmp_path: Path):
+    stage.until("idle")
+    reply = stage.open(tmp_path, mesh=b"nodes")
+    assert reply.digest == content_digest("t-1", Scenario(seed=4), b"nodes")
+    path = tmp_path / "audit.mcap"
+    assert stage.until("recording").path == str(path)
+    for tick in range(5):
+        stage.tick(tick)
+    status = stage.say(task_status(), "planner/task_status")
+    closed = stage.ask_close(4, status.seq).wait()
+    assert isinstance(closed, CloseReply)
+    assert (closed.path, closed.lost) == (str(path), 0)
+
+    found = recorded(path)
+    for key in ("robot/state", "sim/tissue_state", "sa/verdict"):
+        assert found[key] == [0, 1, 2, 3, 4]
+    assert found["planner/task_status"] == [0]
+    assert "rpc/recorder/open" in found
+    assert closed.messages == sum(len(sequences) for sequences in found.values())
+    final = stage.until("closed")
+    assert (final.trial, final.reason, final.lost) == ("t-1", "closed", 0)
+    assert (final.messages, final.bytes) == (closed.messages, path.stat().st_size)
+
+
+def test_the_log_carries_the_scenario(stage: Stage, tmp_path: Path):
+    stage.open(tmp_path, mesh=b"nodes")
+    stage.say(task_status(), "planner/task_status")
+    stage.ask_close(-1, 0).wait()
+    path = tmp_path / "audit.mcap"
+    written = to_toml(Scenario(seed=4))
+    with path.open("rb") as stream:
+        attached = {a.name: a.data for a in make_reader(stream).iter_attachments()}
+    assert attached == {"scenario.toml": written.encode(), "mesh": b"nodes"}
+    said = metadata(path)
+    assert said["fras"]["trial"] == "t-1"
+    assert said["fras"]["scenario"] == written
+    assert {"fras_version", "python_version", "host"} <= set(said["fras"])
+    assert said["fras.closed"]["reason"] == "closed"
+
+
+def test_the_close_waits_for_the_last_tick_of_each_key(
+    stage: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(recorder, "QUIET_S", 0.0)
+    stage.open(tmp_path)
+    stage.tick(0)
+    status = stage.say(task_status(), "planner/task_status")
+    closing = stage.ask_close(1, status.seq)
+    stage.say(robot_state(1, "t-1"), "robot/state")
+    stage.say(tissue_state(1, "t-1"), "sim/tissue_state")
+    stage.settle()
+    assert closing.outcomes == []
+    stage.say(verdict(1, "t-1"), "sa/verdict")
+    assert isinstance(closing.wait(), CloseReply)
+    assert recorded(tmp_path / "audit.mcap")["sa/verdict"] == [0, 1]
+
+
+def test_the_close_waits_for_the_status(
+    stage: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(recorder, "QUIET_S", 0.0)
+    stage.open(tmp_path)
+    stage.tick(0)
+    first = stage.say(task_status(), "planner/task_status")
+    closing = stage.ask_close(0, first.seq + 1)
+    stage.settle()
+    assert closing.outcomes == []
+    stage.say(task_status(), "planner/task_status")
+    assert isinstance(closing.wait(), CloseReply)
+    assert recorded(tmp_path / "audit.mcap")["planner/task_status"] == [0, 1]
+
+
+def test_the_close_waits_for_a_moment_of_quiet(
+    stage: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(recorder, "QUIET_S", 0.5)
+    stage.open(tmp_path)
+    stage.tick(0)
+    status = stage.say(task_status(), "planner/task_status")
+    closing = stage.ask_close(0, status.seq)
+    stage.settle()
+    assert closing.outcomes == []
+    stage.tick(1)
+    closing.wait()
+    assert recorded(tmp_path / "audit.mcap")["robot/state"] == [0, 1]
+
+
+def test_a_log_that_never_gets_complete_is_closed_in_the_end(
+    stage: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(recorder, "CLOSE_TIMEOUT_S", 0.1)
+    stage.open(tmp_path)
+    stage.tick(0)
+    assert isinstance(stage.ask_close(99, 99).wait(), CloseReply)
+    assert recorded(tmp_path / "audit.mcap")["robot/state"] == [0]
+
+
+def test_closing_without_an_open_log_is_refused(stage: Stage):
+    fault = stage.ask_close(0, 0).wait()
+    assert isinstance(fault, RemoteFault)
+    assert fault.remote_kind == "NothingToClose"
+
+
+def test_closing_another_trials_log_is_refused(stage: Stage, tmp_path: Path):
+    stage.open(tmp_path)
+    fault = stage.ask_close(0, 0, trial="t-2").wait()
+    assert fault.remote_kind == "NothingToClose"
+    assert "t-2" in str(fault)
+    assert stage.states[-1].state == "recording"
+
+
+def test_a_later_close_supersedes_an_earlier_one(stage: Stage, tmp_path: Path):
+    stage.open(tmp_path)
+    first = stage.ask_close(7, 0)
+    stage.settle()
+    stage.say(task_status(), "planner/task_status")
+    second = stage.ask_close(-1, 0)
+    assert isinstance(second.wait(), CloseReply)
+    fault = first.wait()
+    assert isinstance(fault, RemoteFault)
+    assert "superseded" in str(fault)
+
+
+def test_a_second_open_supersedes_the_first(stage: Stage, tmp_path: Path):
+    stage.open(tmp_path / "1")
+    stage.tick(0)
+    stage.open(tmp_path / "2", trial="t-2")
+    stage.tick(0, trial="t-2")
+    stage.settle()
+    assert metadata(tmp_path / "1" / "audit.mcap")["fras.closed"]["reason"] == "superseded"
+    assert recorded(tmp_path / "1" / "audit.mcap")["robot/state"] == [0]
+    status = stage.say(task_status("t-2"), "planner/task_status")
+    stage.ask_close(0, status.seq, trial="t-2").wait()
+    assert recorded(tmp_path / "2" / "audit.mcap")["robot/state"] == [1]
+
+
+def test_an_open_that_supersedes_answers_the_close_that_waited(stage: Stage, tmp_path: Path):
+    stage.open(tmp_path / "1")
+    closing = stage.ask_close(50, 50)
+    stage.open(tmp_path / "2", trial="t-2")
+    assert closing.wait().path == str(tmp_path / "1" / "audit.mcap")
+
+
+def test_a_log_is_never_written_over(stage: Stage, tmp_path: Path):
+    stage.open(tmp_path)
+    stage.say(task_status(), "planner/task_status")
+    stage.ask_close(-1, 0).wait()
+    before = (tmp_path / "audit.mcap").read_bytes()
+    with pytest.raises(RemoteFault, match="never written over") as caught:
+        stage.open(tmp_path)
+    assert caught.value.remote_kind == "LogExists"
+    assert (tmp_path / "audit.mcap").read_bytes() == before
+
+
+def test_a_directory_that_cannot_be_made_is_refused(stage: Stage, tmp_path: Path):
+    (tmp_path / "file").write_text("in the way", encoding="utf-8")
+    with pytest.raises(RemoteFault, match="cannot write"):
+        stage.open(tmp_path / "file")
+
+
+def test_between_trials_nothing_is_written(stage: Stage, tmp_path: Path):
+    stage.tick(0)
+    stage.open(tmp_path)
+    stage.say(task_status(), "planner/task_status")
+    closed = stage.ask_close(-1, 0).wait()
+    stage.tick(1)
+    stage.settle()
+    assert "robot/state" not in recorded(Path(closed.path))
+
+
+def test_what_is_no_message_is_recorded_too(stage: Stage, tmp_path: Path):
+    stage.open(tmp_path)
+    stage.speaker.carry(HEALTH, RawSample("unheard/of", b"\xc1", "text/plain"))
+    stage.say(task_status(), "planner/task_status")
+    stage.ask_close(-1, 0).wait()
+    assert "unheard/of" in recorded(tmp_path / "audit.mcap")
+
+
+def test_a_quiet_second_does_not_stay_in_memory(stage: Stage, tmp_path: Path):
+    stage.open(tmp_path)
+    path = tmp_path / "audit.mcap"
+    empty = path.stat().st_size
+    stage.tick(0)
+    since = time.monotonic()
+    while path.stat().st_size == empty:
+        stage.settle()
+        assert time.monotonic() - since < 1.5
+
+
+def test_a_disk_that_fails_is_said_and_survived(
+    stage: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    def full(self: LogFile) -> None:
+        raise OSError(28, "No space left on device")
+
+    stage.open(tmp_path)
+    closing = stage.ask_close(50, 50)
+    monkeypatch.setattr(LogFile, "flush", full)
+    status = stage.until("error")
+    assert "No space left" in status.reason
+    assert status.path == str(tmp_path / "audit.mcap")
+    fault = closing.wait()
+    assert isinstance(fault, RemoteFault)
+    assert "No space left" in str(fault)
+    monkeypatch.undo()
+    stage.open(tmp_path / "next", trial="t-2")
+    assert stage.until("recording").state == "recording"
+
+
+def test_the_end_of_the_process_finishes_the_file(tmp_path: Path):
+    stage = Stage()
+    stage.open(tmp_path)
+    stage.tick(0)
+    stage.settle()
+    stage.end()
+    assert recorded(tmp_path / "audit.mcap")["sa/verdict"] == [0]
+    assert metadata(tmp_path / "audit.mcap")["fras.closed"]["reason"] == "stopped"
+
+
+def test_what_is_written_can_be_decoded(stage: Stage, tmp_path: Path):
+    stage.open(tmp_path)
+    sent = stage.say(verdict(0, "t-1"), "sa/verdict")
+    stage.say(task_status(), "planner/task_status")
+    stage.ask_close(-1, 0).wait()
+    with (tmp_path / "audit.mcap").open("rb") as stream:
+        (payload,) = [
+            message.data
+            for _, _, message in make_reader(stream).iter_messages(topics=["sa/verdict"])
+        ]
+    assert decode(Verdict, payload, "sa/verdict") == sent
