@@ -6,8 +6,7 @@ from typing import Any
 
 import pytest
 
-from fras_common.bus import MemoryBus, MemoryFabric, RemoteFault
-from fras_common.errors import FrasError
+from fras_common.bus import RemoteFault
 from fras_common.messages import (
     ActionResult,
     ExecuteReply,
@@ -20,7 +19,6 @@ from fras_common.messages import (
     Verdict,
 )
 from fras_common.scenario import RunSection, Scenario, resolve
-from fras_common.service import ServiceHost
 from fras_common.topics import (
     ACTION_RESULT,
     EXECUTE,
@@ -31,52 +29,30 @@ from fras_common.topics import (
     VERDICT,
 )
 from fras_motion.service import MotionService
+from support.shells import ShellBench
 
 TARGET = (0.03, 0.03, 0.005)
 
 
-class Bench:
-    """The service, driven by hand, and a client that hears it and plays SA."""
+class Bench(ShellBench):
+    """Motion, and a client that plays SA."""
 
     def __init__(self) -> None:
-        fabric = MemoryFabric()
-        self.client = MemoryBus(fabric, "cell", "sa/test")
-        self.host = ServiceHost("motion")
-        self.host.attach(MemoryBus(fabric, "cell", "motion/test"))
-        self.service = MotionService(self.host)
-        self.states: list[RobotState] = []
-        self.results: list[ActionResult] = []
-        self.client.subscribe(ROBOT_STATE, self.states.append)
-        self.client.subscribe(ACTION_RESULT, self.results.append)
+        super().__init__("motion", MotionService, client="sa/test")
+        self.states: list[RobotState] = self.heard(ROBOT_STATE)
+        self.results: list[ActionResult] = self.heard(ACTION_RESULT)
         self._verdicts = self.client.publisher(VERDICT)
-
-    def ask(self, query: Any, request: Any) -> Any:
-        """Ask, let the loop handle it, and return the answer or raise."""
-        answers: list[Any] = []
-        self.client.ask(query, request, answers.append, 5.0)
-        self.settle()
-        (answer,) = answers
-        if isinstance(answer, FrasError):
-            raise answer
-        return answer
-
-    def settle(self) -> float | None:
-        """Handle everything in the inbox; returns what the service then waits for."""
-        wait_s = self.service.wake()
-        while self.host.drain(0.0):
-            wait_s = self.service.wake()
-        return wait_s
 
     def reset(self, trial: str = "t", **run: Any) -> None:
         scenario = resolve(Scenario(run=RunSection(pace=0, **run)))
-        self.ask(MOTION_RESET, ResetRequest(trial=trial, scenario=scenario))
+        self.answer(MOTION_RESET, ResetRequest(trial=trial, scenario=scenario))
 
     def reach(self, goal_id: str = "g1", trial: str = "t", **changes: Any) -> ExecuteReply:
         fields: dict[str, Any] = {"name": "reach", "arm": "psm1", "target_m": TARGET, **changes}
         request = ExecuteRequest(trial=trial, goal_id=goal_id, block="b(2,2)", **fields)
-        return self.ask(EXECUTE, request)
+        return self.answer(EXECUTE, request)
 
-    def judge(self, tick: int, trial: str = "t", level: Any = "ok") -> float | None:
+    def judge(self, tick: int, trial: str = "t", level: Any = "ok") -> None:
         self._verdicts.put(
             Verdict(
                 tick=tick,
@@ -94,7 +70,7 @@ class Bench:
                 grasped={},
             )
         )
-        return self.settle()
+        self.settle()
 
     def judge_until_result(self) -> ActionResult:
         while not self.results:
@@ -106,8 +82,7 @@ class Bench:
 def bench() -> Iterator[Bench]:
     made = Bench()
     yield made
-    made.host.bus.close()
-    made.client.close()
+    made.close()
 
 
 def test_no_tick_without_the_verdict_on_the_present_one(bench: Bench) -> None:
@@ -184,17 +159,17 @@ def test_hold_is_answered_before_the_loop_gets_to_it(bench: Bench) -> None:
     assert stopped.holds == {"monitor": "stop pressed"}
     assert stopped.action is not None
     with pytest.raises(RemoteFault, match="NotYourHold"):
-        bench.ask(RESUME, ResumeRequest(holder="monitor", by="executive"))
+        bench.answer(RESUME, ResumeRequest(holder="monitor", by="executive"))
     with pytest.raises(RemoteFault, match="UnknownHold"):
-        bench.ask(RESUME, ResumeRequest(holder="cli", by="cli"))
-    assert bench.ask(RESUME, ResumeRequest(holder="monitor", by="cli")).holds == {}
+        bench.answer(RESUME, ResumeRequest(holder="cli", by="cli"))
+    assert bench.answer(RESUME, ResumeRequest(holder="monitor", by="cli")).holds == {}
     bench.judge(stopped.tick)
     assert (bench.results[-1].outcome, bench.results[-1].reason) == ("interrupted", "hold")
 
 
 def test_hold_outlives_a_reset(bench: Bench) -> None:
     bench.reset()
-    bench.ask(HOLD, HoldRequest(holder="cli", reason="wait"))
+    bench.answer(HOLD, HoldRequest(holder="cli", reason="wait"))
     bench.reset("t2")
     assert bench.reach(trial="t2").accepted
     bench.judge(0, trial="t2")
@@ -215,7 +190,7 @@ def test_patience_ends_and_says_who_was_waited_for(
     bench.reset(**run)
     bench.judge(0)
     if held:
-        bench.ask(HOLD, HoldRequest(holder="cli", reason="look"))
+        bench.answer(HOLD, HoldRequest(holder="cli", reason="look"))
     bench.reach()
     deadline_s = time.monotonic() + 10
     while not bench.results and time.monotonic() < deadline_s:
@@ -228,4 +203,4 @@ def test_reset_with_impossible_numbers_is_a_typed_fault(bench: Bench) -> None:
 
     scenario = resolve(Scenario(motion=MotionSection(free_speed_m_s=0.4)))
     with pytest.raises(RemoteFault, match="free_speed_m_s"):
-        bench.ask(MOTION_RESET, ResetRequest(trial="t", scenario=scenario))
+        bench.answer(MOTION_RESET, ResetRequest(trial="t", scenario=scenario))

@@ -6,28 +6,22 @@ from typing import Any
 
 import pytest
 
-from fras_common.bus import MemoryBus, MemoryFabric
 from fras_common.codec import content_digest
 from fras_common.messages import OpenRequest, ResetReply, TaskReply, TaskRequest, TaskStatus
 from fras_common.scenario import RunSection, Scenario, resolve
-from fras_common.service import ServiceHost
 from fras_common.topics import RECORDER_OPEN, TASK, TASK_STATUS
 from fras_planner.service import PlannerService
+from support.shells import ShellBench
 
 SCENARIO = resolve(Scenario(run=RunSection(peer_timeout_s=0.2)))
 
 
-class Bench:
-    """The service, driven by hand, and a client; a recorder answers if asked to."""
+class Bench(ShellBench):
+    """The planner, and a client; a recorder answers if asked to."""
 
     def __init__(self) -> None:
-        self.fabric = MemoryFabric()
-        self.client = MemoryBus(self.fabric, "cell", "cli/test")
-        self.host = ServiceHost("planner")
-        self.host.attach(MemoryBus(self.fabric, "cell", "planner/test"))
-        self.service = PlannerService(self.host)
-        self.statuses: list[TaskStatus] = []
-        self.client.subscribe(TASK_STATUS, self.statuses.append)
+        super().__init__("planner", PlannerService, client="cli/test")
+        self.statuses: list[TaskStatus] = self.heard(TASK_STATUS)
 
     def answer_recorder(self) -> None:
         def open_log(call: Any) -> None:
@@ -37,15 +31,10 @@ class Bench:
 
         self.client.serve(RECORDER_OPEN, open_log)
 
-    def ask(self, **fields: Any) -> list[TaskReply]:
+    def task(self, **fields: Any) -> list[TaskReply]:
         """Ask `planner/task`; the list fills when the answer comes."""
-        answers: list[TaskReply] = []
         settings: dict[str, Any] = {"command": "start", "trial": "t", **fields}
-        request = TaskRequest(**settings)
-        self.client.ask(TASK, request, answers.append, 30.0)  # type: ignore[arg-type]
-        while self.host.drain(0.0):
-            self.service.wake()
-        return answers
+        return self.ask(TASK, TaskRequest(**settings))
 
     def run_until(self, condition: Any) -> None:
         deadline_s = time.monotonic() + 20
@@ -59,20 +48,19 @@ class Bench:
 def bench() -> Iterator[Bench]:
     made = Bench()
     yield made
-    made.host.bus.close()
-    made.client.close()
+    made.close()
 
 
 def test_start_needs_a_resolved_scenario(bench: Bench) -> None:
-    (none,) = bench.ask()
+    (none,) = bench.task()
     assert (none.accepted, none.reason) == (False, "start needs a resolved scenario")
-    (unresolved,) = bench.ask(scenario=Scenario())
+    (unresolved,) = bench.task(scenario=Scenario())
     assert not unresolved.accepted
     assert bench.statuses == []
 
 
 def test_start_without_a_recorder_is_refused_with_the_reason(bench: Bench) -> None:
-    answers = bench.ask(scenario=SCENARIO)
+    answers = bench.task(scenario=SCENARIO)
     bench.run_until(lambda: answers)
     assert (answers[0].accepted, answers[0].reason) == (False, "hold:recorder")
     assert [status.phase for status in bench.statuses] == ["resetting", "ended", "idle"]
@@ -81,11 +69,11 @@ def test_start_without_a_recorder_is_refused_with_the_reason(bench: Bench) -> No
 
 def test_trial_that_began_ends_by_name_when_a_service_is_missing(bench: Bench) -> None:
     bench.answer_recorder()
-    answers = bench.ask(scenario=SCENARIO)
+    answers = bench.task(scenario=SCENARIO)
     bench.run_until(lambda: bench.statuses and bench.statuses[-1].phase == "idle")
     assert answers[0].accepted
     assert (bench.statuses[-1].outcome, bench.statuses[-1].reason) == ("aborted", "hold:motion")
-    again = bench.ask(scenario=SCENARIO, trial="t2")
+    again = bench.task(scenario=SCENARIO, trial="t2")
     bench.run_until(lambda: again)
     assert again[0].accepted
 
@@ -93,12 +81,12 @@ def test_trial_that_began_ends_by_name_when_a_service_is_missing(bench: Bench) -
 def test_one_trial_at_a_time_and_abort_names_its_trial(bench: Bench) -> None:
     answers: list[Any] = []
     bench.client.serve(RECORDER_OPEN, answers.append)  # never answered: the trial stays begun
-    first = bench.ask(scenario=SCENARIO)
-    second = bench.ask(scenario=SCENARIO, trial="t2")
+    first = bench.task(scenario=SCENARIO)
+    second = bench.task(scenario=SCENARIO, trial="t2")
     assert second[0].reason == "trial t is under way"
-    (wrong,) = bench.ask(command="abort", trial="t2")
+    (wrong,) = bench.task(command="abort", trial="t2")
     assert not wrong.accepted
-    (right,) = bench.ask(command="abort", trial="t", reason="surgeon said so")
+    (right,) = bench.task(command="abort", trial="t", reason="surgeon said so")
     assert right.accepted
     bench.run_until(lambda: bench.statuses[-1].phase == "idle")
     assert bench.statuses[-1].outcome == "aborted"

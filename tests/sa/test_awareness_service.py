@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fras_common.bus import MemoryBus, MemoryFabric, RemoteFault
+from fras_common.bus import RemoteFault
 from fras_common.errors import FrasError
 from fras_common.messages import (
     Array,
@@ -19,7 +19,6 @@ from fras_common.messages import (
     Verdict,
 )
 from fras_common.scenario import Scenario, SceneSection
-from fras_common.service import ServiceHost
 from fras_common.topics import (
     ROBOT_STATE,
     SA_CONTEXT,
@@ -32,6 +31,7 @@ from fras_common.topics import (
 from fras_sa.join import TickJoin
 from fras_sa.service import AwarenessService
 from support.robots import robot
+from support.shells import ShellBench
 
 CORNERS = np.array(
     [[x, y, z] for z in (0.0, 0.005) for y in (0.0, 0.12) for x in (0.0, 0.1)], dtype=np.float64
@@ -66,30 +66,15 @@ def tissue(tick: int, force_n: float = 0.0, converged: bool = True, **header: An
     )
 
 
-class Bench:
-    """The service, driven by hand, and a client that plays sim and motion."""
+class Bench(ShellBench):
+    """Situation awareness, and a client that plays sim and motion."""
 
     def __init__(self) -> None:
-        fabric = MemoryFabric()
-        self.client = MemoryBus(fabric, "cell", "sim/test")
-        self.host = ServiceHost("sa")
-        self.host.attach(MemoryBus(fabric, "cell", "sa/test"))
-        self.service = AwarenessService(self.host)
-        self.verdicts: list[Verdict] = []
-        self.client.subscribe(VERDICT, self.verdicts.append)
+        super().__init__("sa", AwarenessService, client="sim/test")
+        self.verdicts: list[Verdict] = self.heard(VERDICT)
         self.model = self.client.publisher(TISSUE_MODEL)
         self.tissue = self.client.publisher(TISSUE_STATE)
         self.robot = self.client.publisher(ROBOT_STATE)
-
-    def settle(self) -> None:
-        while self.host.drain(0.0):
-            pass
-
-    def ask(self, query: Any, request: Any) -> list[Any]:
-        answers: list[Any] = []
-        self.client.ask(query, request, answers.append, 5.0)
-        self.settle()
-        return answers
 
     def reset(self, trial: str = "t") -> None:
         scene = SceneSection(roi_m=(0.05, 0.06, 0.0))
@@ -121,8 +106,7 @@ class Bench:
 def bench() -> Iterator[Bench]:
     made = Bench()
     yield made
-    made.host.bus.close()
-    made.client.close()
+    made.close()
 
 
 def test_join_waits_for_both_and_keeps_the_order() -> None:

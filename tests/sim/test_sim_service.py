@@ -7,62 +7,45 @@ import numpy as np
 import pytest
 from structlog.testing import capture_logs
 
-from fras_common.bus import MemoryBus, MemoryFabric, RemoteFault
+from fras_common.bus import RemoteFault
 from fras_common.codec import content_digest
-from fras_common.errors import FrasError
 from fras_common.messages import ResetRequest, TissueModel, TissueState
 from fras_common.scenario import Disc, Scenario, SceneSection, TissueSection
-from fras_common.service import ServiceHost
 from fras_common.topics import ROBOT_STATE, SIM_RESET, TISSUE_MODEL, TISSUE_STATE
 from fras_sim.service import SimService
 from support.robots import robot
+from support.shells import ShellBench
 
 SCENE = SceneSection(roi_m=(0.05, 0.06, 0.0), discs=(Disc(center_m=(0.02, 0.09), radius_m=0.02),))
 SMALL = TissueSection(node_counts=(6, 7, 2))
 
 
-class Bench:
-    """The service, driven by hand, and a client that plays the robot."""
+class Bench(ShellBench):
+    """The simulator, and a client that plays the robot."""
 
     def __init__(self) -> None:
-        fabric = MemoryFabric()
-        self.client = MemoryBus(fabric, "cell", "motion/test")
-        self.host = ServiceHost("sim")
-        self.host.attach(MemoryBus(fabric, "cell", "sim/test"))
-        self.service = SimService(self.host)
-        self.models: list[TissueModel] = []
-        self.states: list[TissueState] = []
-        self.client.subscribe(TISSUE_MODEL, self.models.append)
-        self.client.subscribe(TISSUE_STATE, self.states.append)
+        super().__init__("sim", SimService, client="motion/test")
+        self.models: list[TissueModel] = self.heard(TISSUE_MODEL)
+        self.states: list[TissueState] = self.heard(TISSUE_STATE)
         self.robot = self.client.publisher(ROBOT_STATE)
-
-    def settle(self) -> None:
-        while self.host.drain(0.0):
-            pass
 
     def put(self, *arguments: Any, **options: Any) -> None:
         self.robot.put(robot(*arguments, **options))
         self.settle()
 
-    def reset(self, trial: str = "t", scenario: Scenario | None = None) -> Any:
+    def reset(self, trial: str = "t", scenario: Scenario | None = None) -> None:
         request = ResetRequest(
             trial=trial, scenario=scenario or Scenario(tissue=SMALL, scene=SCENE)
         )
-        answers: list[Any] = []
-        self.client.ask(SIM_RESET, request, answers.append, 5.0)
-        self.settle()
-        if isinstance(answers[0], FrasError):
-            raise answers[0]
-        assert answers[0].digest == content_digest(trial, request.scenario, b"")
-        return answers[0]
+        answer = self.answer(SIM_RESET, request)
+        assert answer.digest == content_digest(trial, request.scenario, b"")
 
 
 @pytest.fixture
 def bench() -> Iterator[Bench]:
     made = Bench()
     yield made
-    made.host.bus.close()
-    made.client.close()
+    made.close()
 
 
 def test_reset_publishes_the_tissue_at_rest(bench: Bench) -> None:
