@@ -1,6 +1,7 @@
 """`fras up|down|status|stop|resume`: a stack that stays, and what one does to it."""
 
 import signal
+import sys
 import time
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from fras_cli.stack import own_stack
 from fras_common.errors import FrasError
 from fras_common.messages import Health, HoldRequest, HoldState, ResumeRequest, TaskStatus
 from fras_common.topics import HEALTH, HOLD, RESUME, SERVICES, TASK_STATUS
+from fras_supervisor import Console as Lines
 
 HOLDER = "cli"
 POLL_S = 0.2
@@ -32,10 +34,13 @@ def up(cell: str, port: int, log_dir: Path, console: Console) -> int:
     connect = f"tcp/127.0.0.1:{port}"
     runtime.keep(cell, connect, log_dir)
     try:
-        with caught_interrupts() as interrupts:
+        with caught_interrupts() as interrupts, Lines(sys.stdout, ["router", *SERVICES]) as echo:
             began_s = time.monotonic()
-            stopping = lambda: interrupts.count > 0  # noqa: E731
-            with own_stack(cell, connect, log_dir, cancelled=stopping) as stack:
+
+            def stopping() -> bool:
+                return interrupts.count > 0
+
+            with own_stack(cell, connect, log_dir, cancelled=stopping, echo=echo) as stack:
                 console.print(
                     f"ready after {time.monotonic() - began_s:.1f} s: cell {cell}, {connect}, "
                     f"logs in {log_dir}; Ctrl-C or `fras down --cell {cell}` stops it"

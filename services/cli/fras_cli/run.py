@@ -116,23 +116,29 @@ def run_trials(
     folders = trial_folders(scenarios, out)
     out.mkdir(parents=True, exist_ok=True)
     outcomes: list[str] = []
-    with caught_interrupts() as interrupts:
-        console.print("starting the services", style="dim")
-        with use_stack(
-            cell, connect, port, out / "logs", cancelled=lambda: interrupts.count > 0
-        ) as stack:
-            follower = TrialFollower(stack)
-            for scenario, folder in zip(scenarios, folders, strict=True):
-                if not stack.own:
-                    scenario = without_hold_timeout(scenario)
-                summary = _one_trial(follower, scenario, folder, console, interrupts)
-                outcomes.append(summary.outcome)
-                if as_json:
-                    print(msgspec.json.encode(summary).decode(), flush=True)
-                if interrupts.count:
-                    break
+    with (
+        caught_interrupts() as interrupts,
+        use_stack(
+            cell,
+            connect,
+            port,
+            out / "logs",
+            cancelled=lambda: interrupts.count > 0,
+            tell=lambda words: console.print(words, style="dim"),
+        ) as stack,
+    ):
+        follower = TrialFollower(stack)
+        for scenario, folder in zip(scenarios, folders, strict=True):
             if not stack.own:
-                _copy_logs(stack, out / "logs")
+                scenario = without_hold_timeout(scenario)
+            summary = _one_trial(follower, scenario, folder, console, interrupts)
+            outcomes.append(summary.outcome)
+            if as_json:
+                print(msgspec.json.encode(summary).decode(), flush=True)
+            if interrupts.count:
+                break
+        if not stack.own:
+            _copy_logs(stack, out / "logs")
     if len(scenarios) > 1:
         _print_tally(console, outcomes)
     if interrupts.count:

@@ -10,6 +10,7 @@ from fras_cli import runtime
 from fras_cli.link import Link
 from fras_common.errors import FrasError
 from fras_supervisor import Exit, Stack, find_table, free_port, load_table
+from fras_supervisor.logs import Echo
 
 COMPLETE_TIMEOUT_S = 5.0
 
@@ -44,7 +45,11 @@ class UsedStack:
 
 @contextmanager
 def own_stack(
-    cell: str, connect: str | None, log_dir: Path, cancelled: Callable[[], bool] = lambda: False
+    cell: str,
+    connect: str | None,
+    log_dir: Path,
+    cancelled: Callable[[], bool] = lambda: False,
+    echo: Echo | None = None,
 ) -> Generator[UsedStack]:
     """Start a stack, and stop it whatever happens.
 
@@ -56,12 +61,14 @@ def own_stack(
     log_dir : Path
     cancelled : callable
         True ends the start.
+    echo : callable, optional
+        Gets each line that a service logs.
     """
     started_ns = time.time_ns()
     endpoint = connect or f"tcp/127.0.0.1:{free_port()}"
     table = load_table(find_table("local"))
     with Link(cell, endpoint) as link:
-        stack = Stack(table, cell, endpoint, log_dir, link.tokens, cancelled=cancelled)
+        stack = Stack(table, cell, endpoint, log_dir, link.tokens, cancelled=cancelled, echo=echo)
         stack.start()
         try:
             yield UsedStack(link, started_ns, log_dir, own=True, watch=stack.watch)
@@ -94,7 +101,8 @@ def use_stack(
     connect: str | None,
     port: int | None,
     log_dir: Path,
-    cancelled: Callable[[], bool] = lambda: False,
+    cancelled: Callable[[], bool],
+    tell: Callable[[str], None],
 ) -> Generator[UsedStack]:
     """Use the stack at `connect`, else the one that `fras up` keeps in `cell`, else an own one.
 
@@ -109,15 +117,20 @@ def use_stack(
         Where an own stack logs.
     cancelled : callable
         True ends the start of an own stack.
+    tell : callable
+        Gets which of them it is, in words.
     """
     kept = runtime.find(cell) if connect is None and port is None else None
     if connect is not None:
+        tell(f"using the stack of cell {cell} at {connect}")
         with running_stack(cell, connect, None) as used:
             yield used
     elif kept is not None:
+        tell(f"using the stack that is up in cell {cell}, {kept.connect}")
         with running_stack(cell, kept.connect, Path(kept.log_dir)) as used:
             yield used
     else:
+        tell("starting the services")
         endpoint = f"tcp/127.0.0.1:{port}" if port is not None else None
         with own_stack(cell, endpoint, log_dir, cancelled) as used:
             yield used

@@ -29,6 +29,14 @@ class Stderr(io.TextIOBase):
             sys.stderr.flush()
 
 
+def in_reading_order(
+    _logger: Any, _method: str, event: MutableMapping[str, Any]
+) -> Mapping[str, Any]:
+    """When, how grave, who, what; then the rest."""
+    first = ("timestamp", "level", "service", "event")
+    return {key: event[key] for key in first if key in event} | event
+
+
 def configure_logging(service: str, level: str, emit: Emit) -> structlog.stdlib.BoundLogger:
     """Set structlog up for this process and return the service's logger.
 
@@ -53,6 +61,7 @@ def configure_logging(service: str, level: str, emit: Emit) -> structlog.stdlib.
             structlog.processors.format_exc_info,
             publish,
             structlog.processors.TimeStamper(fmt="iso", utc=True),
+            in_reading_order,
             structlog.processors.JSONRenderer(sort_keys=False, default=str),
         ],
         wrapper_class=structlog.make_filtering_bound_logger(logging.getLevelNamesMapping()[level]),
