@@ -37,7 +37,7 @@ from fras_common.messages import (
     TissueState,
     Verdict,
 )
-from fras_common.messages.motion import ActionName, ActionOutcome
+from fras_common.messages.motion import ActionOutcome
 from fras_common.scenario import Scenario, TissueSection, attachment_raster, resolve, to_toml
 from fras_common.scenario.geometry import nodes_in_discs
 from fras_recorder.log_file import LogFile
@@ -51,7 +51,7 @@ HEX8_FACES = np.array(
 BLOCK = "b(4,4)"
 GRASP_M = np.array([0.05, 0.06, 0.005])
 # Each goal with its arm's action, last tick, and the tip's height at that tick.
-GOALS: tuple[tuple[str, ActionName, int, ActionOutcome, str], ...] = (
+GOALS: tuple[tuple[str, str, int, ActionOutcome, str], ...] = (
     ("g1", "reach", 18, "succeeded", ""),
     ("g2", "grasp", 24, "succeeded", ""),
     ("g3", "pull", 50, "interrupted", "force_soft"),

@@ -34,7 +34,7 @@ def in_reading_order(
 ) -> Mapping[str, Any]:
     """When, how grave, who, what; then the rest."""
     first = ("timestamp", "level", "service", "event")
-    return {key: event[key] for key in first if key in event} | event
+    return {**{key: event[key] for key in first if key in event}, **event}
 
 
 def configure_logging(service: str, level: str, emit: Emit) -> structlog.stdlib.BoundLogger:
