@@ -120,22 +120,27 @@ def test_stop_and_resume_by_a_client_that_is_not_the_executive(trials: Any) -> N
     from fras_common.messages import HoldRequest, ResumeRequest
     from fras_common.topics import HOLD, RESUME
 
+    bus = trials.stack.link.bus
     held_at: list[int] = []
+    seen: list[int] = []
 
-    def press_stop(view: TrialView) -> None:
-        lifting = view.robot is not None and view.robot.action is not None
-        if lifting and not held_at and view.robot.action.phase == "descend":  # type: ignore[union-attr]
-            request = HoldRequest(holder="cli", reason="test")
-            state = trials.stack.link.bus.query(HOLD, request, 5.0)
+    def press_stop_and_lift_it_at_rest(view: TrialView) -> None:
+        if view.robot is None or view.robot.action is None:
+            return
+        if not held_at and view.robot.action.phase == "descend":
+            state = bus.query(HOLD, HoldRequest(holder="cli", reason="test"), 5.0)
             assert state.holds == {"cli": "test"}
             held_at.append(state.tick)
-            trials.stack.link.bus.query(RESUME, ResumeRequest(holder="cli", by="cli"), 5.0)
+        elif held_at and len(seen) < 2:
+            # Two looks at the same tick: logical time stands still.
+            seen[:] = [*(tick for tick in seen if tick == view.robot.tick), view.robot.tick]
+            if len(seen) == 2:
+                bus.query(RESUME, ResumeRequest(holder="cli", by="cli"), 5.0)
 
-    summary, log = trials.run("a", press_stop)
-    (tick,) = held_at
+    summary, log = trials.run("a", press_stop_and_lift_it_at_rest)
     states: list[RobotState] = messages(log, "robot/state")
     ended = next(s.tick for s in states if s.action and s.action.phase == "interrupted")
-    assert ended - tick <= 4  # one under way, two to stop, one to say so
+    assert ended - held_at[0] <= 4  # one under way, two to stop, one to say so
     for arm in ("psm1", "psm2"):
         at_rest, before = states[ended].arms[arm], states[ended - 1].arms[arm]
         assert at_rest.setpoint_joints == before.setpoint_joints
