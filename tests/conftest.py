@@ -1,6 +1,5 @@
 """One BLAS thread everywhere, before numpy is imported: two threads give other bits than one."""
 
-import os
+from fras_common.threads import one_thread
 
-for _library in ("OMP", "OPENBLAS", "MKL", "NUMBA"):
-    os.environ[f"{_library}_NUM_THREADS"] = "1"
+one_thread()

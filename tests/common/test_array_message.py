@@ -3,6 +3,7 @@
 from typing import Any
 
 import msgpack
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given
@@ -10,7 +11,7 @@ from hypothesis.extra import numpy as hnp
 from numpy.typing import NDArray
 
 from fras_common.codec import MalformedMessage, decode, encode
-from fras_common.messages import Array
+from fras_common.messages import Array, SolverReport, TissueState
 
 SHAPES = hnp.array_shapes(min_dims=0, max_dims=4, min_side=0, max_side=5)
 
@@ -105,3 +106,40 @@ def test_whatever_the_codec_lets_through_can_be_viewed(shape: tuple[int, ...]):
     except MalformedMessage:
         return
     assert array.view().shape == shape
+
+
+@pytest.mark.parametrize(
+    ("field", "values", "dtype"),
+    [
+        ("nodes_m", np.zeros((2, 3)), "<f8"),
+        ("nodes_m", np.zeros((2, 2)), "<f4"),
+        ("nodal_force_n", np.zeros(3), "<f4"),
+    ],
+)
+def test_message_refuses_an_array_of_another_type_or_shape(
+    field: str, values: Any, dtype: Any
+) -> None:
+    good = {"nodes_m": Array.of(np.zeros((2, 3)), "<f4")}
+    good["nodal_force_n"] = good["nodes_m"]
+    raw = msgspec.to_builtins(
+        {
+            "max_force_n": 0.0,
+            "max_node_speed_m_s": 0.0,
+            "tool_force_n": {},
+            "grasped": {},
+            "solver": SolverReport(
+                iterations=0,
+                residual=0.0,
+                refactored=False,
+                wall_s=0.0,
+                converged=True,
+                inverted_elements=0,
+            ),
+            **good,
+        },
+        builtin_types=(bytes,),
+    )
+    decode(TissueState, encode(raw), "sim/tissue_state")
+    raw[field] = msgspec.to_builtins(Array.of(values, dtype), builtin_types=(bytes,))
+    with pytest.raises(MalformedMessage, match=rf"{field} is .*expected <f4"):
+        decode(TissueState, encode(raw), "sim/tissue_state")

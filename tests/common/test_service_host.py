@@ -1,12 +1,11 @@
 """The host of a service: one inbox, one loop, mirrors, counts, readiness, health."""
 
-import os
 import threading
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import pytest
+from structlog.testing import capture_logs
 
 from fras_common.bus import RemoteFault
 from fras_common.codec import decode
@@ -23,11 +22,11 @@ from fras_common.messages import (
 from fras_common.service import Deferred, ServiceHost
 from fras_common.service.health import ProcessMeter
 from fras_common.service.host import INBOX
-from fras_common.topics import HEALTH, HOLD, LOG, RPC, SA_TARGET, TASK_STATUS, VERDICT, Qos, Topic
+from fras_common.topics import HOLD, LOG, RPC, SA_TARGET, TASK_STATUS, VERDICT, Qos, Topic
 
 Ask = Callable[..., list[Any]]
 
-REQUEST = TargetRequest(action="reach", arm="psm1", block="b(1,1)")
+REQUEST = TargetRequest(trial="t", action="reach", arm="psm1", block="b(1,1)")
 REPLY = TargetReply(position_m=(0.1, 0.2, 0.3))
 
 
@@ -297,16 +296,39 @@ def test_a_hold_is_answered_while_the_loop_is_stuck(bench: Any):
     assert [record.key for record in mirrored] == ["motion/hold"]
 
 
-def test_a_fault_beyond_the_tree_of_errors_is_not_hidden(bench: Any, outcome: Ask):
-    host = bench.host("sa")
+def test_a_query_that_meets_our_own_mistake_is_answered_all_the_same(bench: Any, outcome: Ask):
+    host, mirrored = bench.host("sa"), mirrors(bench)
 
     def broken(_: TargetRequest) -> TargetReply:
         raise ZeroDivisionError
 
     host.serve(SA_TARGET, broken)
-    outcome(bench.bus("motion/1"), SA_TARGET, REQUEST, 0.01)
-    with pytest.raises(ZeroDivisionError):
+    answers = outcome(bench.bus("motion/1"), SA_TARGET, REQUEST, 5.0)
+    with capture_logs() as logs:
         bench.settle()
+    (error,) = answers
+    assert isinstance(error, RemoteFault)
+    assert error.remote_kind == "InternalFault"
+    assert (logs[0]["log_level"], logs[0]["exc_info"]) == ("error", True)
+    assert mirrored[0].fault.kind == "InternalFault"
+
+
+@pytest.mark.parametrize(("error", "ends"), [(FrasError("no"), False), (ZeroDivisionError(), True)])
+def test_a_handler_may_refuse_a_message_but_not_break(bench: Any, error: Exception, ends: bool):
+    """What a message says may be refused; a mistake of our own ends the process, seen by all."""
+    host = bench.host("sa")
+
+    def handler(_: Verdict) -> None:
+        raise error
+
+    host.subscribe(VERDICT, handler)
+    bench.bus("sa/1").publisher(VERDICT).put(verdict(0, trial=""))
+    if ends:
+        with pytest.raises(ZeroDivisionError):
+            bench.settle()
+    else:
+        bench.settle()
+        assert host.counts["refused"] == 1
 
 
 def test_a_malformed_request_never_reaches_the_handler(bench: Any, outcome: Ask):
@@ -317,114 +339,3 @@ def test_a_malformed_request_never_reaches_the_handler(bench: Any, outcome: Ask)
     assert got[0].remote_kind == "MalformedMessage"
     assert host.health(ProcessMeter()).malformed == 1
     assert mirrored == []
-
-
-# --- readiness and health ---------------------------------------------------------------------
-
-
-def ready(bench: Any, name: str) -> bool:
-    bench.settle()
-    tokens: list[str] = []
-    bench.bus("witness/1").watch_tokens(lambda token, present: tokens.append(token))
-    return f"ready/{name}/1" in tokens
-
-
-def test_a_service_without_inputs_is_ready_once_it_is_alive(bench: Any):
-    host = bench.host("sim")
-    assert host.state == "starting"
-    assert not ready(bench, "sim")
-    host.announce_alive()
-    assert ready(bench, "sim")
-    assert host.state == "ready"
-    assert host.present("alive/sim")
-
-
-def test_a_service_is_ready_only_when_its_inputs_are_there(bench: Any):
-    motion, sa, sim = bench.host("motion"), bench.host("sa"), bench.host("sim")
-    motion.subscribe(VERDICT, lambda message: None)
-    motion.require("sim")
-    motion.announce_alive()
-    assert not ready(bench, "motion")
-    sa.announce_alive()
-    assert not ready(bench, "motion")
-    sim.announce_alive()
-    assert ready(bench, "motion")
-    assert motion.state == "ready"
-
-
-def test_own_and_everybodys_topics_are_no_inputs(bench: Any):
-    host = bench.host("sa")
-    host.subscribe(VERDICT, lambda message: None)
-    host.subscribe(HEALTH, lambda message: None)
-    host.announce_alive()
-    assert ready(bench, "sa")
-
-
-def test_an_input_that_was_there_before_counts(bench: Any):
-    bench.host("sa").announce_alive()
-    motion = bench.host("motion")
-    motion.subscribe(VERDICT, lambda message: None)
-    motion.announce_alive()
-    assert ready(bench, "motion")
-
-
-def test_presence_lasts_as_long_as_one_instance(bench: Any):
-    host = bench.host("motion")
-    old, new = bench.bus("sa/old"), bench.bus("sa/new")
-    old.announce("alive/sa")
-    new.announce("alive/sa")
-    bench.settle()
-    old.close()
-    bench.settle()
-    assert host.present("alive/sa")
-    new.close()
-    bench.settle()
-    assert not host.present("alive/sa")
-
-
-def test_health_tells_what_the_service_does(bench: Any):
-    host = bench.host("sim")
-    host.enter_trial("t-1")
-    host.tick = 12
-    host.facts["linear_solver"] = "block tridiagonal"
-    host.publisher(VERDICT).put(verdict(12))
-    host.announce_alive()
-    bench.settle()
-    meter = ProcessMeter()
-    health = host.health(meter)
-    assert (health.service, health.state, health.tick) == ("sim", "ready", 12)
-    assert (health.published, health.trial) == (1, "t-1")
-    assert health.facts == {"linear_solver": "block tridiagonal"}
-    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
-    assert health.rss_bytes == pytest.approx(pages * os.sysconf("SC_PAGE_SIZE"), rel=0.2)
-    assert health.cpu_percent >= 0.0
-    host.waiting_for = "sa"
-    assert host.health(meter).state == "waiting: sa"
-
-
-def test_health_is_published_until_told_to_stop(bench: Any):
-    host, beats, enough, stop = bench.host("sim"), [], threading.Event(), threading.Event()
-
-    def beat(message: Any) -> None:
-        beats.append(message)
-        if len(beats) == 2:
-            enough.set()
-
-    bench.bus("witness/1").subscribe(HEALTH, beat)
-    thread = threading.Thread(target=host.report_health, args=(stop,))
-    thread.start()
-    assert enough.wait(10.0)
-    stop.set()
-    thread.join(10.0)
-    first, second = beats[:2]
-    assert second.seq == first.seq + 1
-    assert 0.3e9 < second.stamp_ns - first.stamp_ns < 3e9
-
-
-def test_a_log_record_bears_the_trial(bench: Any):
-    host, records = bench.host("sim"), bench.heard(LOG)
-    host.enter_trial("t-1")
-    host.publish_log(LogRecord(level="error", event="solver", fields={"residual": "1"}))
-    (record,) = records
-    assert (record.trial, record.source, record.event) == ("t-1", "sim/1", "solver")
-    ServiceHost("sa").publish_log(LogRecord(level="error", event="too early", fields={}))

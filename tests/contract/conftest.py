@@ -153,6 +153,15 @@ def _arrays(draw: st.DrawFn) -> Array:
     return Array.of(np.array(values, dtype=np.int64).reshape(shape), dtype)
 
 
+@st.composite
+def _shaped(draw: st.DrawFn, dtype: Any, columns: int | str | None) -> Array:
+    rows = draw(st.integers(0, 3))
+    width: Any = draw(st.integers(0, 4)) if columns == "any" else columns
+    shape = (rows,) if width is None else (rows, width)
+    values = draw(st.lists(st.integers(-9, 9), min_size=12, max_size=12))
+    return Array.of(np.resize(np.array(values), shape), dtype)
+
+
 def _of(annotation: Any, metas: list[msgspec.Meta] | None = None) -> st.SearchStrategy[Any]:
     """Strategy for a field's annotation; fails on a kind of field that it does not know."""
     origin, arguments = get_origin(annotation), get_args(annotation)
@@ -176,7 +185,16 @@ def _of(annotation: Any, metas: list[msgspec.Meta] | None = None) -> st.SearchSt
         )
     if isinstance(annotation, type) and issubclass(annotation, msgspec.Struct):
         fields = msgspec.structs.fields(annotation)
-        return st.builds(annotation, **{field.name: _of(field.type) for field in fields})
+        shaped = getattr(annotation, "ARRAYS", {})
+        return st.builds(
+            annotation,
+            **{
+                field.name: _shaped(*shaped[field.name])
+                if field.name in shaped
+                else _of(field.type)
+                for field in fields
+            },
+        )
     simple: dict[Any, st.SearchStrategy[Any]] = {
         type(None): st.none(),
         bool: st.booleans(),

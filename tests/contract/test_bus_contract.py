@@ -278,7 +278,7 @@ def test_every_call_on_a_closed_bus_raises(open_bus: Open):
     bus = open_bus("sim/1")
     publisher = bus.publisher(SIM_LOG)
     bus.close()
-    request = TargetRequest(action="reach", arm="psm1", block="b(1,1)")
+    request = TargetRequest(trial="t", action="reach", arm="psm1", block="b(1,1)")
     for call in (
         lambda: publisher.put(record("late")),
         lambda: bus.publisher(SIM_LOG),

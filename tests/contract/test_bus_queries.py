@@ -15,7 +15,7 @@ from fras_common.topics import EXECUTE, HOLD, SA_TARGET, Query
 Open = Callable[..., Bus]
 Listen = Callable[[], Any]
 
-REQUEST = TargetRequest(action="reach", arm="psm1", block="b(1,1)")
+REQUEST = TargetRequest(trial="t", action="reach", arm="psm1", block="b(1,1)")
 REPLY = TargetReply(position_m=(0.01, 0.02, 0.03))
 
 
@@ -77,7 +77,7 @@ def test_the_answer_may_come_later_and_out_of_order(open_bus: Open, listen: List
             continue
     known = len(waiting)
     for number in range(2):
-        request = TargetRequest(action="move", arm="psm1", block=str(number))
+        request = TargetRequest(trial="t", action="move", arm="psm1", block=str(number))
         asker.ask(SA_TARGET, request, outcomes, 10.0)
     calls = {
         call.request.block: call
@@ -111,7 +111,7 @@ def test_asking_does_not_wait(open_bus: Open, listen: Listen):
 
 
 def test_without_a_server_there_is_no_answer(open_bus: Open):
-    with pytest.raises(NoAnswer, match="sa/target: no answer within 2"):
+    with pytest.raises(NoAnswer, match="sa/target: nobody answered, 2"):
         open_bus("motion/1").query(SA_TARGET, REQUEST, 2.0)
 
 

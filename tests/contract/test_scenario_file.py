@@ -24,6 +24,9 @@ def made_possible(scenario: Scenario) -> Scenario:
     generator, awareness, scene = scenario.generator, scenario.awareness, scenario.scene
     x, y, z = (max(0.001, extent) for extent in scenario.tissue.size_m)
     tissue = replace(scenario.tissue, size_m=(x, y, z))
+    if tissue.mesh_file is None:
+        box = "hex8" if tissue.element == "hex8" else "hex8-sri"
+        tissue = replace(tissue, element=box, mesh_scale=1.0)
     if scene is not None:
         (u, v, w), discs = scene.roi_m, scene.discs
         scene = SceneSection(

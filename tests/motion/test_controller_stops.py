@@ -356,3 +356,28 @@ def test_setpoint_that_fails_a_gate_is_not_sent_and_ends_the_action():
     assert phases([last]) == ["interrupted"]
     assert last.snapshot.arms["psm1"].setpoint_joints == setpoint
     assert not controller.wants_tick
+
+
+@pytest.mark.parametrize("first", ["soft", "held"])
+def test_hard_crossing_while_stopping_is_latched_and_names_the_end(holding, run, first):
+    holding.execute(PULL)
+    tick(holding, 30)
+    if first == "soft":
+        tick(holding, 1, level="soft", max_force_n=0.6)
+    else:
+        holding.hold("page", "stop")
+    tick(holding, 1, level="hard", max_force_n=1.2)
+    holding.resume("page")
+    advances = run(holding)
+    assert end(advances) == ("interrupted", "force_hard")
+    assert holding.hard_latched
+
+
+def test_latch_is_lifted_by_the_arm_that_holds_the_tissue(holding, run, from_tick):
+    run(holding, PULL, from_tick(30, level="hard", max_force_n=1.2))
+    assert end(run(holding, Goal("g", "release", "psm2"))) == ("succeeded", "")
+    assert holding.hard_latched
+    with pytest.raises(Refused, match="hard_latch"):
+        holding.execute(PULL)
+    run(holding, RELEASE)
+    assert not holding.hard_latched

@@ -9,6 +9,8 @@ import pytest
 from fras_common.bus import RemoteFault
 from fras_common.messages import (
     ActionResult,
+    CancelReply,
+    CancelRequest,
     ExecuteReply,
     ExecuteRequest,
     HoldRequest,
@@ -21,6 +23,7 @@ from fras_common.messages import (
 from fras_common.scenario import RunSection, Scenario, resolve
 from fras_common.topics import (
     ACTION_RESULT,
+    CANCEL,
     EXECUTE,
     HOLD,
     MOTION_RESET,
@@ -204,3 +207,76 @@ def test_reset_with_impossible_numbers_is_a_typed_fault(bench: Bench) -> None:
     scenario = resolve(Scenario(motion=MotionSection(free_speed_m_s=0.4)))
     with pytest.raises(RemoteFault, match="free_speed_m_s"):
         bench.answer(MOTION_RESET, ResetRequest(trial="t", scenario=scenario))
+
+
+def cancel(bench: Bench, trial: str = "t") -> list[CancelReply]:
+    return bench.ask(CANCEL, CancelRequest(trial=trial, reason="test"))
+
+
+def test_cancel_brings_the_arms_to_rest_before_it_is_answered(bench: Bench) -> None:
+    bench.reset()
+    bench.reach()
+    for tick in range(40):
+        bench.judge(tick)
+    answers = cancel(bench)
+    assert answers == []
+    for tick in range(40, 46):
+        bench.judge(tick)
+    assert answers[0].tick == bench.states[-1].tick <= 43
+    assert (bench.results[-1].outcome, bench.results[-1].reason) == ("aborted", "cancelled")
+    assert bench.states[-1].holds == {"cancel": "test"}
+
+
+def test_goal_that_comes_after_the_cancel_moves_nothing(bench: Bench) -> None:
+    bench.reset()
+    bench.judge(0)
+    assert cancel(bench)[0].tick == 0
+    late = bench.reach()
+    assert (late.accepted, late.reason) == (False, "another_trial")
+    bench.judge(0)
+    assert len(bench.states) == 1
+    bench.reset("t2")
+    assert bench.reach(trial="t2").accepted
+
+
+def test_cancel_of_another_trial_is_answered_and_stops_nothing(bench: Bench) -> None:
+    bench.reset()
+    bench.reach()
+    bench.judge(0)
+    cancel(bench, "yesterday")
+    bench.judge(1)
+    assert [state.tick for state in bench.states] == [0, 1, 2]
+    assert bench.results == []
+
+
+def test_cancel_does_not_wait_for_a_verdict_that_never_comes(bench: Bench) -> None:
+    bench.reset(peer_timeout_s=60.0)
+    bench.judge(0)
+    bench.reach()
+    assert bench.states[-1].tick == 1  # and no verdict on it
+    answers = cancel(bench)
+    deadline_s = time.monotonic() + 10
+    while not answers and time.monotonic() < deadline_s:
+        bench.settle()
+    assert answers[0].tick == 1
+    assert bench.results[-1].reason == "cancelled"
+
+
+def test_reset_in_mid_action_ends_that_action_by_name(bench: Bench) -> None:
+    bench.reset()
+    bench.judge(0)
+    bench.reach()
+    bench.reset("t2")
+    assert (bench.results[-1].trial, bench.results[-1].reason) == ("t", "reset")
+
+
+def test_hold_that_no_tick_can_show_is_published_all_the_same(bench: Bench) -> None:
+    bench.reset()
+    bench.answer(HOLD, HoldRequest(holder="cli", reason="wait"))
+    assert [(state.tick, state.holds) for state in bench.states] == [
+        (0, {}),
+        (0, {"cli": "wait"}),
+    ]
+    assert bench.host.facts["holds"] == "cli: wait"
+    bench.answer(RESUME, ResumeRequest(holder="cli", by="cli"))
+    assert bench.states[-1].holds == {}

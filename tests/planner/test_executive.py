@@ -12,11 +12,11 @@ from fras_common.codec import content_digest
 from fras_common.errors import FrasError
 from fras_common.messages import (
     ActionResult,
+    CancelReply,
     CloseReply,
     Context,
     ExecuteReply,
     Fault,
-    HoldState,
     NoPlan,
     Plan,
     PlannedAction,
@@ -27,11 +27,10 @@ from fras_common.messages import (
 )
 from fras_common.scenario import PlannerSection, Scenario, resolve
 from fras_common.topics import (
+    CANCEL,
     EXECUTE,
-    HOLD,
     RECORDER_CLOSE,
     RECORDER_OPEN,
-    RESUME,
     SA_CONTEXT,
     SA_TARGET,
     SIM_RESET,
@@ -97,7 +96,7 @@ class World:
             actions=[] if isinstance(content, NoPlan) else content,
             target="",
             arm="",
-            history={},
+            history=[],
             cost=[],
             models=1,
             ground_s=0.0,
@@ -175,8 +174,8 @@ class World:
         if ask.query is RECORDER_CLOSE:
             assert request.last_tick == self.tick
             return CloseReply(path="", messages=0, lost=0)
-        if ask.query in (HOLD, RESUME):
-            return HoldState(holds={}, tick=self.tick)
+        if ask.query is CANCEL:
+            return CancelReply(tick=self.tick)
         return ResetReply(digest=content_digest("t", self.scenario, b""))
 
 
@@ -211,7 +210,7 @@ def test_a_trial_resets_in_order_and_closes_its_log() -> None:
     assert (end.plans, end.replans) == (2, 0)
     assert world.accepted
     assert world.asked[:4] == ["recorder/open", "motion/reset", "sim/reset", "sa/reset"]
-    assert world.asked[-1] == "recorder/close"
+    assert world.asked[-2:] == ["motion/cancel", "recorder/close"]
     assert [request.reason for request in world.requests] == ["initial", "exposure"]
 
 
@@ -331,7 +330,7 @@ def test_abort_stops_the_arms_and_closes_the_log() -> None:
     world = World([pulling()], EXPOSED, abort_at="pull")
     end = world.run()
     assert (end.outcome, end.reason) == ("aborted", "enough")
-    assert world.asked[-3:] == ["motion/hold", "motion/resume", "recorder/close"]
+    assert world.asked[-2:] == ["motion/cancel", "recorder/close"]
 
 
 @pytest.mark.parametrize(

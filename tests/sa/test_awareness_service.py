@@ -165,7 +165,7 @@ def test_levels_reach_the_wire(bench: Bench) -> None:
 def test_context_is_answered_when_its_tick_is_there(bench: Bench) -> None:
     bench.reset()
     bench.tick(0)
-    waiting = bench.ask(SA_CONTEXT, ContextRequest(request_id="c1", min_tick=1))
+    waiting = bench.ask(SA_CONTEXT, ContextRequest(trial="t", request_id="c1", min_tick=1))
     assert waiting == []
     bench.tick(1)
     (context,) = waiting
@@ -177,22 +177,32 @@ def test_context_is_answered_when_its_tick_is_there(bench: Bench) -> None:
 
 def test_context_of_a_trial_that_ended_is_a_typed_fault(bench: Bench) -> None:
     bench.reset()
-    waiting = bench.ask(SA_CONTEXT, ContextRequest(request_id="c1", min_tick=9))
+    waiting = bench.ask(SA_CONTEXT, ContextRequest(trial="t", request_id="c1", min_tick=9))
     bench.reset("t2")
     assert isinstance(waiting[0], RemoteFault)
     assert waiting[0].remote_kind == "NothingKnown"
 
 
 def test_targets(bench: Bench) -> None:
-    (early,) = bench.ask(SA_TARGET, TargetRequest(action="reach", arm="psm1", block="b(4,4)"))
+    (early,) = bench.ask(
+        SA_TARGET, TargetRequest(trial="t", action="reach", arm="psm1", block="b(4,4)")
+    )
     assert isinstance(early, FrasError)
     bench.reset()
     bench.tick(0)
-    (reach,) = bench.ask(SA_TARGET, TargetRequest(action="reach", arm="psm1", block="b(4,4)"))
+    (reach,) = bench.ask(
+        SA_TARGET, TargetRequest(trial="t", action="reach", arm="psm1", block="b(4,4)")
+    )
     assert reach.position_m == pytest.approx((0.05, 0.06, 0.005), abs=1e-6)
-    (move,) = bench.ask(SA_TARGET, TargetRequest(action="move", arm="psm1", block="b(4,4)"))
+    (move,) = bench.ask(
+        SA_TARGET, TargetRequest(trial="t", action="move", arm="psm1", block="b(4,4)")
+    )
     assert move.position_m == pytest.approx((0.05, 0.06, 0.06), abs=1e-6)
-    (pull,) = bench.ask(SA_TARGET, TargetRequest(action="pull", arm="psm1", block="b(4,4)"))
+    (pull,) = bench.ask(
+        SA_TARGET, TargetRequest(trial="t", action="pull", arm="psm1", block="b(4,4)")
+    )
     assert pull.position_m is None
-    (unknown,) = bench.ask(SA_TARGET, TargetRequest(action="reach", arm="psm1", block="b(9,9)"))
+    (unknown,) = bench.ask(
+        SA_TARGET, TargetRequest(trial="t", action="reach", arm="psm1", block="b(9,9)")
+    )
     assert unknown.remote_kind == "UnknownName"

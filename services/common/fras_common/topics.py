@@ -110,6 +110,7 @@ TOPICS: tuple[Topic[Any], ...] = (
 
 TASK = Query("planner/task", m.TaskRequest, m.TaskReply, "planner")
 EXECUTE = Query("motion/execute", m.ExecuteRequest, m.ExecuteReply, "motion")
+CANCEL = Query("motion/cancel", m.CancelRequest, m.CancelReply, "motion")
 HOLD = Query("motion/hold", m.HoldRequest, m.HoldState, "motion")
 RESUME = Query("motion/resume", m.ResumeRequest, m.HoldState, "motion")
 MOTION_RESET = Query("motion/reset", m.ResetRequest, m.ResetReply, "motion")
@@ -123,6 +124,7 @@ RECORDER_CLOSE = Query("recorder/close", m.CloseRequest, m.CloseReply, "recorder
 QUERIES: tuple[Query[Any, Any], ...] = (
     TASK,
     EXECUTE,
+    CANCEL,
     HOLD,
     RESUME,
     MOTION_RESET,

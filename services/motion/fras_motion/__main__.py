@@ -2,11 +2,14 @@
 
 import sys
 
-from fras_common.service import run_service
+from fras_common.threads import one_thread
 
 
 def main(argv: list[str] | None = None) -> int:
     """Run the service."""
+    one_thread()
+    from fras_common.service import run_service
+
     return run_service(
         "motion", "fras_motion.service:MotionService", argv, "Move the arms, tick by tick."
     )

@@ -85,7 +85,7 @@ class MotionController:
         }
         self._grasp_heights: dict[str, float] = {}
         self._course: Course | None = None
-        self._latched = False
+        self._latched: set[str] = set()
         self._last = self._observe(0, None, -1)
         return self.snapshot
 
@@ -111,8 +111,8 @@ class MotionController:
 
     @property
     def hard_latched(self) -> bool:
-        """Whether the hard limit was crossed and no release has succeeded since."""
-        return self._latched
+        """Whether an arm crossed the hard limit and has not succeeded in a release since."""
+        return bool(self._latched)
 
     def execute(self, goal: Goal) -> None:
         """Accept an action, after its whole path has passed every gate.
@@ -229,7 +229,9 @@ class MotionController:
         if course is None or not self.wants_tick:
             raise NoTickWanted(self._last.tick, tuple(sorted(self._holds)))
         course.react(verdict)
-        self._latched = self._latched or course.crossed_hard
+        if verdict.level == "hard" and course.goal.name != "release":
+            holding = {name for name, arm in self._measured.items() if self._closed(arm)}
+            self._latched |= holding or {course.goal.arm}
         progress = self._checked(course, verdict)
         for name, driver in self._drivers.items():
             self._measured[name] = driver.servo(self._setpoints[name], self._parameters.dt_s)
@@ -243,7 +245,7 @@ class MotionController:
             )
             self._course = None
             if course.goal.name == "release" and result.outcome == "succeeded":
-                self._latched = False
+                self._latched.discard(course.goal.arm)
         return Advance(self.snapshot, result)
 
     def _plan(self, goal: Goal) -> Course:

@@ -66,8 +66,9 @@ class Course:
     Notes
     -----
     ``run -> settle -> end`` is the way of success. `halt` leads from there to
-    ``stop [-> retreat] -> end``. The cause that came first names the end; only an invalid verdict
-    overrides it. A retreat goes back along the stroke it was called in.
+    ``stop [-> retreat] -> end``. The cause that came first names the end; only a graver one
+    overrides it: a crossed hard limit, and an invalid verdict. A retreat goes back along the stroke
+    it was called in.
     """
 
     def __init__(
@@ -91,11 +92,6 @@ class Course:
         """Whether the action was halted and its setpoint is at rest."""
         return self._mode == "stop" and self._velocity == 0.0
 
-    @property
-    def crossed_hard(self) -> bool:
-        """Whether the hard limit was crossed."""
-        return self._ending is not None and self._ending.reason == "force_hard"
-
     def hold(self) -> None:
         """Stop, for a holder; a retreat stops too, and is not taken up again."""
         self._halt(Ending("interrupted", "hold"))
@@ -117,6 +113,13 @@ class Course:
         elif reaction is Reaction.RETREAT and self._mode in ("run", "settle"):
             self._halt(Ending("interrupted", f"force_{verdict.level}"))
             self._retreats = bool(self._strokes) and self._strokes[self._index].can_retreat
+        elif verdict.level == "hard" and self.goal.name != "release":
+            self._outrank(Ending("interrupted", "force_hard"))
+
+    def _outrank(self, graver: Ending) -> None:
+        """Let a graver cause name the end that a stop under way will have."""
+        if self._ending is not None and self._ending.outcome == "interrupted":
+            self._ending = graver
 
     def step(self, verdict: Verdict, before: Setpoint, held: bool) -> Progress:
         """Do the next tick.

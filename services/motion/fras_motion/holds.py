@@ -4,7 +4,6 @@ import threading
 from typing import Final
 
 from fras_common.errors import FrasError
-from fras_motion.controller import MotionController
 
 LIFTS_ANY: Final = frozenset({"cli", "monitor"})
 """Where a person stands behind the request; software lifts its own holds only."""
@@ -64,12 +63,3 @@ class Holds:
     def in_words(self) -> str:
         """Tell the holds in force; empty if there is none."""
         return "; ".join(f"{holder}: {reason}" for holder, reason in self.current().items())
-
-    def impose(self, controller: MotionController) -> None:
-        """Make the controller's holds those in force."""
-        wanted, standing = self.current(), controller.snapshot.holds
-        for holder, reason in wanted.items():
-            if standing.get(holder) != reason:
-                controller.hold(holder, reason)
-        for holder in standing.keys() - wanted.keys():
-            controller.resume(holder)

@@ -2,21 +2,12 @@
 
 import time
 
+from fras_common import messages as m
 from fras_common.codec import content_digest
-from fras_common.messages import (
-    ExecuteReply,
-    ExecuteRequest,
-    HoldRequest,
-    HoldState,
-    ResetReply,
-    ResetRequest,
-    ResumeRequest,
-    Verdict,
-)
-from fras_common.scenario import Scenario
-from fras_common.service import ServiceHost
+from fras_common.service import Deferred, ServiceHost
 from fras_common.topics import (
     ACTION_RESULT,
+    CANCEL,
     EXECUTE,
     HOLD,
     MOTION_RESET,
@@ -25,13 +16,13 @@ from fras_common.topics import (
     VERDICT,
 )
 from fras_motion.adapter import action_result, goal_of, parameters_of, robot_state, verdict_of
-from fras_motion.controller import MotionController
 from fras_motion.errors import Refused
 from fras_motion.holds import Holds
 from fras_motion.pacing import Pacer
 from fras_motion.patience import Patience
 from fras_motion.peers import Peers
-from fras_motion.states import ActionResult, Goal
+from fras_motion.states import ActionResult
+from fras_motion.trial import MotionTrial
 
 
 class MotionService:
@@ -40,104 +31,117 @@ class MotionService:
     def __init__(self, host: ServiceHost) -> None:
         self._host = host
         self._holds = Holds()
-        self._controller: MotionController | None = None
-        self._verdict: Verdict | None = None
-        self._goal: Goal | None = None
+        self._trial: MotionTrial | None = None
+        self._verdict: m.Verdict | None = None
+        self._cancels: list[Deferred[m.CancelRequest, m.CancelReply]] = []
+        self._pacer = Pacer(dt_s=0.0, pace=0.0)
+        self._patience = Patience(peer_timeout_s=0.0, hold_timeout_s=0.0)
         self._peers = Peers(host)
-        self._begin(Scenario())
         self._state = host.publisher(ROBOT_STATE)
         self._result = host.publisher(ACTION_RESULT)
         host.subscribe(VERDICT, self._on_verdict)
         host.serve(MOTION_RESET, self._reset)
         host.serve(EXECUTE, self._execute)
+        host.serve_deferred(CANCEL, self._begin_cancel)
         host.serve_at_once(HOLD, self._hold)
         host.serve_at_once(RESUME, self._resume)
 
-    def _begin(self, scenario: Scenario) -> None:
+    def _reset(self, request: m.ResetRequest) -> m.ResetReply:
+        scenario = request.scenario
+        trial = MotionTrial(request.trial, parameters_of(scenario), self._holds)
+        if self._trial is not None:
+            self._finish(self._trial, self._trial.end("reset"))
+        self._trial = trial
+        self._verdict = None
         self._pacer = Pacer(scenario.tissue.dt_s, scenario.run.pace)
         self._patience = Patience(scenario.run.peer_timeout_s, scenario.run.hold_timeout_s)
-
-    def _reset(self, request: ResetRequest) -> ResetReply:
-        controller = MotionController(parameters_of(request.scenario))
-        self._begin(request.scenario)
-        self._controller = controller
-        self._verdict = None
-        self._goal = None
-        self._holds.impose(controller)
         self._host.enter_trial(request.trial)
-        self._publish(controller)
-        return ResetReply(digest=content_digest(request.trial, request.scenario, request.mesh))
+        self._publish(trial)
+        return m.ResetReply(digest=content_digest(request.trial, scenario, request.mesh))
 
-    def _execute(self, request: ExecuteRequest) -> ExecuteReply:
-        controller = self._controller
-        if controller is None or request.trial != self._host.gate.trial:
-            return ExecuteReply(accepted=False, reason="another_trial")
-        goal = goal_of(request)
+    def _execute(self, request: m.ExecuteRequest) -> m.ExecuteReply:
+        if self._trial is None:
+            return m.ExecuteReply(accepted=False, reason="another_trial")
         try:
-            controller.execute(goal)
+            self._trial.execute(request.trial, goal_of(request))
         except Refused as error:
             self._host.log.warning("goal refused", goal=request.goal_id, problem=str(error))
-            return ExecuteReply(accepted=False, reason=error.reason)
-        self._goal = goal
-        return ExecuteReply(accepted=True, reason="")
+            return m.ExecuteReply(accepted=False, reason=error.reason)
+        return m.ExecuteReply(accepted=True, reason="")
 
-    def _hold(self, request: HoldRequest) -> HoldState:
+    def _begin_cancel(self, pending: Deferred[m.CancelRequest, m.CancelReply]) -> None:
+        if self._trial is not None and self._trial.name == pending.request.trial:
+            self._trial.cancel(pending.request.reason)
+        self._cancels.append(pending)
+
+    def _hold(self, request: m.HoldRequest) -> m.HoldState:
         # On the receiving thread: the stop must not wait behind anything.
         holds = self._holds.hold(request.holder, request.reason)
         self._host.post(lambda: self._host.log.info("held", by=request.holder))
-        return HoldState(holds=holds, tick=self._host.tick)
+        return m.HoldState(holds=holds, tick=self._host.tick)
 
-    def _resume(self, request: ResumeRequest) -> HoldState:
+    def _resume(self, request: m.ResumeRequest) -> m.HoldState:
         holds = self._holds.resume(request.holder, request.by)
         self._host.post(lambda: self._host.log.info("hold lifted", of=request.holder))
-        return HoldState(holds=holds, tick=self._host.tick)
+        return m.HoldState(holds=holds, tick=self._host.tick)
 
-    def _on_verdict(self, verdict: Verdict) -> None:
+    def _on_verdict(self, verdict: m.Verdict) -> None:
         self._verdict = verdict
 
     def wake(self) -> float | None:
         """Do the next tick if it is due; else see whether something has been missing too long."""
-        controller, now_s = self._controller, time.monotonic()
-        if controller is None:
-            return None
-        self._holds.impose(controller)
         self._host.facts["holds"] = self._holds.in_words()
-        tick, verdict = controller.snapshot.tick, self._verdict
-        if controller.wants_tick and verdict is not None and verdict.tick == tick:
+        trial, now_s = self._trial, time.monotonic()
+        if trial is not None and trial.impose_holds():
+            # No tick may follow that would show it.
+            self._publish(trial)
+        if trial is None or not trial.controller.wants_tick:
+            self._end_cancels(trial)
+        if trial is None:
+            return None
+        verdict = verdict_of(self._verdict) if self._verdict is not None else None
+        if verdict is not None and trial.may_tick(verdict):
             self._host.waiting_for = ""
             self._patience.rest()
-            wait_s = self._pacer.wait_s(now_s)
-            if wait_s > 0.0:
+            if (wait_s := self._pacer.wait_s(now_s)) > 0.0:
                 return wait_s
-            self._advance(controller, verdict, now_s)
+            advance = trial.controller.advance(verdict)
+            self._pacer.ticked(now_s)
+            self._publish(trial)
+            self._finish(trial, advance.result)
             return self._patience.period_s
-        if self._goal is None:
+        return self._wait(trial, now_s)
+
+    def _wait(self, trial: MotionTrial, now_s: float) -> float | None:
+        if trial.goal is None:
             self._patience.rest()
             return None
-        missing = self._peers.missing(tick) if controller.wants_tick else ""
+        missing = self._peers.missing(trial.tick) if trial.controller.wants_tick else ""
         reason = self._patience.exhausted(now_s, missing, self._holds)
         self._host.waiting_for = self._patience.waiting_for
         if reason:
-            self._finish(controller.abort(reason))
+            self._finish(trial, trial.end(reason))
+        elif self._host.waiting_for:
+            # No verdict, no tick: the arms stand already.
+            self._end_cancels(trial)
         return self._patience.period_s
 
-    def _advance(self, controller: MotionController, verdict: Verdict, now_s: float) -> None:
-        advance = controller.advance(verdict_of(verdict))
-        self._pacer.ticked(now_s)
-        self._publish(controller)
-        self._finish(advance.result)
+    def _end_cancels(self, trial: MotionTrial | None) -> None:
+        pending, self._cancels = self._cancels, []
+        if pending and trial is not None:
+            self._finish(trial, trial.end("cancelled"))
+        for one in pending:
+            one.reply(m.CancelReply(tick=self._host.tick))
 
-    def _publish(self, controller: MotionController) -> None:
-        snapshot = controller.snapshot
-        self._host.tick = snapshot.tick
-        self._state.put(robot_state(snapshot, self._host.gate.trial))
+    def _publish(self, trial: MotionTrial) -> None:
+        self._host.tick = trial.tick
+        self._state.put(robot_state(trial.controller.snapshot, trial.name))
 
-    def _finish(self, result: ActionResult | None) -> None:
-        goal = self._goal
-        if result is not None and goal is not None:
-            self._goal = None
+    def _finish(self, trial: MotionTrial, result: ActionResult | None) -> None:
+        if result is not None and trial.goal is not None:
+            goal, trial.goal = trial.goal, None
             self._host.waiting_for = ""
-            self._result.put(action_result(result, goal, self._host.gate.trial))
+            self._result.put(action_result(result, goal, trial.name))
 
     def close(self) -> None:
         """Nothing to put in order: the arms stand at their last setpoint."""

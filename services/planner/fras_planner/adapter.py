@@ -51,7 +51,7 @@ class PlanMaker:
             actions=_actions(plan),
             target=plan.target,
             arm=plan.arm,
-            history={step: list(atoms) for step, atoms in plan.history.items()},
+            history=[m.HistoryStep(t=t, atoms=list(atoms)) for t, atoms in plan.history.items()],
             cost=list(plan.cost),
             models=plan.models,
             ground_s=plan.ground_s,

@@ -11,23 +11,23 @@ from typing import Any
 
 import msgspec
 
-from fras_common.bus import NoAnswer, RemoteFault
+from fras_common.bus import NoAnswer
 from fras_common.codec import content_digest
 from fras_common.errors import FrasError
 from fras_common.messages import (
     ActionResult,
+    CancelReply,
+    CancelRequest,
     CloseRequest,
     Context,
     ContextRequest,
     ExecuteReply,
     ExecuteRequest,
-    HoldRequest,
     OpenRequest,
     Plan,
     PlannedAction,
     ResetReply,
     ResetRequest,
-    ResumeRequest,
     TargetReply,
     TargetRequest,
     TaskRequest,
@@ -35,23 +35,21 @@ from fras_common.messages import (
 )
 from fras_common.scenario import Scenario
 from fras_common.topics import (
+    CANCEL,
     EXECUTE,
-    HOLD,
     MOTION_RESET,
     RECORDER_CLOSE,
     RECORDER_OPEN,
-    RESUME,
     SA_CONTEXT,
     SA_RESET,
     SA_TARGET,
     SIM_RESET,
 )
 from fras_planner.effects import Accept, Ask, AwaitResult, Effect, Say
-from fras_planner.planning import PlanningError
 from fras_planner.tried import Held, newly_tried
 
-HOLDER = "executive"
 RESET_TIMEOUT_S = 60.0
+CLOSE_TIMEOUT_S = 15.0
 
 MakePlan = Callable[[Context, "PlanRequest"], Plan]
 Steps = Generator[Effect, Any, Any]
@@ -95,6 +93,10 @@ def reason_to_replan(ended: Ended) -> str:
 
 class TaskAborted(FrasError):
     """Someone ended the trial; thrown into the executive at whatever it waits for."""
+
+
+class ActionAborted(FrasError):
+    """Motion gave an action up, and with it the trial."""
 
 
 class PeerLost(FrasError):
@@ -141,53 +143,67 @@ class Executive:
         self._goals = 0
         self._contexts = 0
         self._last_tick = 0
-        self._running_goal = ""
         self._log_open = False
+        self._moved = False
+        self._ending = False
 
     @property
     def status(self) -> TaskStatus:
         """The executive's memory as last published."""
         return self._status
 
+    @property
+    def ending(self) -> bool:
+        """Whether the trial is over and only has to be put in order; it can't be aborted twice."""
+        return self._ending
+
     def run(self) -> Steps:
-        """Begin, loop, end, and close the log."""
+        """Begin, loop, end, and close the log; whatever happens, the end is said."""
         yield from self._say()
         try:
             yield from self._open_log()
             yield Accept()
             yield from self._reset()
             outcome, reason = yield from self._retract()
-        except TaskAborted as error:
-            outcome, reason = "aborted", str(error)
-            try:
-                yield from self._stand_still()
-            except (NoAnswer, RemoteFault, PeerLost) as failure:
-                reason = f"{reason}; the stop was not acknowledged: {failure}"
         except PeerLost as error:
             outcome, reason = "aborted", f"hold:{error.service}"
         except NoAnswer as error:
             outcome, reason = "aborted", f"hold:{error.key.partition('/')[0]}"
-        except (RemoteFault, DigestMismatch, PlanningError) as error:
+        except FrasError as error:
             outcome, reason = "aborted", str(error)
+        self._ending = True
+        failures: list[FrasError] = []
+        yield from self._leave_motion(failures)
         seq = yield from self._say(
             phase="ended", action="", goal_id="", outcome=outcome, reason=reason
         )
-        yield from self._close_log(seq)
-
-    def _close_log(self, status_seq: int) -> Steps:
-        """Have the log closed; then, and not before, another trial may start."""
-        failure: FrasError | None = None
-        if self._log_open:
-            closing = CloseRequest(
-                trial=self._request.trial, last_tick=self._last_tick, status_seq=status_seq
-            )
-            try:
-                yield Ask(RECORDER_CLOSE, closing, self._timeout_s)
-            except (NoAnswer, RemoteFault) as error:
-                failure = error
+        yield from self._close_log(seq, failures)
         yield from self._say(phase="idle")
-        if failure is not None:
-            raise failure
+        if failures:
+            raise failures[0]
+
+    def _leave_motion(self, failures: list[FrasError]) -> Steps:
+        """Have motion forget the trial: no goal of it moves the arms any more."""
+        if not self._moved:
+            return
+        request = CancelRequest(trial=self._request.trial, reason="the trial has ended")
+        try:
+            reply: CancelReply = yield Ask(CANCEL, request, self._timeout_s)
+            self._last_tick = max(self._last_tick, reply.tick)
+        except FrasError as error:
+            failures.append(error)
+
+    def _close_log(self, status_seq: int, failures: list[FrasError]) -> Steps:
+        """Have the log closed; then, and not before, another trial may start."""
+        if not self._log_open:
+            return
+        closing = CloseRequest(
+            trial=self._request.trial, last_tick=self._last_tick, status_seq=status_seq
+        )
+        try:
+            yield Ask(RECORDER_CLOSE, closing, CLOSE_TIMEOUT_S)
+        except FrasError as error:
+            failures.append(error)
 
     # --- beginning ------------------------------------------------------------------------
 
@@ -207,6 +223,7 @@ class Executive:
         request = self._request
         reset = ResetRequest(trial=request.trial, scenario=self._scenario, mesh=request.mesh)
         for query in (MOTION_RESET, SIM_RESET, SA_RESET):
+            self._moved = self._moved or query is MOTION_RESET
             reply: ResetReply = yield Ask(query, reset, RESET_TIMEOUT_S)
             self._compare(reply, query.server)
 
@@ -239,8 +256,6 @@ class Executive:
             for action in plan.actions:
                 ended: Ended = yield from self._act(action)
                 context = ended.context
-                if ended.result is not None and ended.result.outcome == "aborted":
-                    return "aborted", ended.result.reason
                 self._remember(ended, planned_with_ignore_ap)
                 if deviation := reason_to_replan(ended):
                     reason = deviation
@@ -248,7 +263,11 @@ class Executive:
 
     def _context(self) -> Steps:
         self._contexts += 1
-        request = ContextRequest(request_id=f"c{self._contexts}", min_tick=self._last_tick)
+        request = ContextRequest(
+            trial=self._request.trial,
+            request_id=f"c{self._contexts}",
+            min_tick=self._last_tick,
+        )
         context: Context = yield Ask(SA_CONTEXT, request, self._timeout_s)
         return context
 
@@ -287,7 +306,7 @@ class Executive:
         self._goals += 1
         goal_id = f"g{self._goals}"
         yield from self._say(phase="acting", action=action.text, goal_id=goal_id)
-        asked = TargetRequest(action=action.name, arm=arm, block=block)
+        asked = TargetRequest(trial=self._request.trial, action=action.name, arm=arm, block=block)
         target: TargetReply = yield Ask(SA_TARGET, asked, self._timeout_s)
         goal = ExecuteRequest(
             trial=self._request.trial,
@@ -301,11 +320,12 @@ class Executive:
         if not reply.accepted:
             context = yield from self._context()
             return Ended(action, None, reply.reason, context)
-        self._running_goal = goal_id
         result: ActionResult = yield AwaitResult(goal_id)
-        self._running_goal = ""
         self._last_tick = result.tick
         yield from self._say(actions=[*self._status.actions, action.text])
+        if result.outcome == "aborted":
+            # Its last tick may never be judged; nothing is asked about it.
+            raise ActionAborted(result.reason)
         context = yield from self._context()
         return Ended(action, result, "", context)
 
@@ -319,16 +339,6 @@ class Executive:
                 self._held = Held(block=action.args[1], ignored_ap=ignored_ap)
             elif action.name == "release":
                 self._held = None
-
-    # --- ending ---------------------------------------------------------------------------
-
-    def _stand_still(self) -> Steps:
-        """Stop the arms, then let go of our own hold: the action ends, nothing follows."""
-        yield Ask(HOLD, HoldRequest(holder=HOLDER, reason="task aborted"), self._timeout_s)
-        yield Ask(RESUME, ResumeRequest(holder=HOLDER, by=HOLDER), self._timeout_s)
-        if self._running_goal:
-            result: ActionResult = yield AwaitResult(self._running_goal)
-            self._last_tick = result.tick
 
     def _say(self, **changes: Any) -> Steps:
         self._status = msgspec.structs.replace(self._status, tick=self._last_tick, **changes)

@@ -4,9 +4,9 @@ import time
 from pathlib import Path
 
 from fras_common.errors import FrasError
-from fras_common.messages import ActionResult, TaskReply, TaskRequest
+from fras_common.messages import RecorderStatus, TaskReply, TaskRequest
 from fras_common.service import Deferred, ServiceHost
-from fras_common.topics import ACTION_RESULT, PLAN, TASK, TASK_STATUS
+from fras_common.topics import ACTION_RESULT, PLAN, RECORDER_STATUS, TASK, TASK_STATUS
 from fras_planner.adapter import PlanMaker
 from fras_planner.executive import Executive, PeerLost, TaskAborted
 from fras_planner.knowledge import load_knowledge
@@ -34,7 +34,8 @@ class PlannerService:
         self._peer_timeout_s = 0.0
         self._motion_gone_since_s: float | None = None
         host.require("sim", "sa", "recorder")
-        host.subscribe(ACTION_RESULT, self._on_result)
+        host.subscribe(ACTION_RESULT, self._performer.deliver)
+        host.subscribe(RECORDER_STATUS, self._on_recorder)
         host.serve_deferred(TASK, self._on_task)
 
     def _on_task(self, pending: Deferred[TaskRequest, TaskReply]) -> None:
@@ -59,11 +60,19 @@ class PlannerService:
         if self._executive is None or self._executive.status.trial != pending.request.trial:
             pending.reply(TaskReply(accepted=False, reason="no such trial is under way"))
             return
+        if self._executive.ending:
+            pending.reply(TaskReply(accepted=False, reason="the trial is ending already"))
+            return
         pending.reply(TaskReply(accepted=True, reason=""))
         self._performer.drive(TaskAborted(pending.request.reason or "aborted on request"))
 
-    def _on_result(self, result: ActionResult) -> None:
-        self._performer.deliver(result)
+    def _on_recorder(self, status: RecorderStatus) -> None:
+        """End the trial whose log can't be written any more: nothing moves unrecorded."""
+        running = self._executive
+        if running is None or running.ending or status.trial != running.status.trial:
+            return
+        if status.state == "error":
+            self._performer.drive(TaskAborted(f"hold:recorder: {status.reason}"))
 
     def _on_end(self, error: FrasError | None) -> None:
         if error is not None:
@@ -81,6 +90,8 @@ class PlannerService:
     def wake(self) -> float | None:
         """Give up on an action whose motion service has been away for too long."""
         if not self._performer.awaited:
+            self._motion_gone_since_s = None
+            self._host.waiting_for = ""
             return None
         now_s = time.monotonic()
         if self._host.present("alive/motion"):

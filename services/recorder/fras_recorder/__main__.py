@@ -3,7 +3,7 @@
 import os
 import sys
 
-from fras_common.service import run_service
+from fras_common.threads import one_thread
 
 # The recorder hears each message at the moment when the next process of the loop has to act on it.
 NICENESS = 5
@@ -12,6 +12,9 @@ NICENESS = 5
 def main(argv: list[str] | None = None) -> int:
     """Run the recorder, behind the processes that the arms wait for."""
     os.nice(NICENESS)
+    one_thread()
+    from fras_common.service import run_service
+
     return run_service(
         "recorder", "fras_recorder.service:RecorderService", argv, "Record all traffic to MCAP."
     )

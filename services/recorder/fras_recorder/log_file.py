@@ -5,6 +5,7 @@ publish time = producer's stamp, log time = arrival. Readable by any MCAP reader
 """
 
 import json
+from collections import deque
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -17,10 +18,36 @@ from fras_common.topics import topic_of
 
 PROFILE = "fras"
 CHUNK_BYTES = 1024 * 1024
+# As many as a publisher's cache can send again.
+REMEMBERED = 2000
 
 
 class LogExists(FrasError):
     """A log is never written over."""
+
+
+class Stream:
+    """What one publisher sent on one key: its last number, and the latest samples by name."""
+
+    def __init__(self) -> None:
+        self.gap = 0
+        self._last: int | None = None
+        self._order: deque[tuple[int, int]] = deque()
+        self._recent: set[tuple[int, int]] = set()
+
+    def note(self, header: HeaderFields) -> bool:
+        """Take a sample into account; False if it is a copy. `gap` is what is missing before it."""
+        name = (header.seq, header.stamp_ns)
+        if name in self._recent:
+            return False
+        self._order.append(name)
+        self._recent.add(name)
+        if len(self._order) > REMEMBERED:
+            self._recent.discard(self._order.popleft())
+        expected = header.seq if self._last is None else self._last + 1
+        self.gap = max(0, header.seq - expected)
+        self._last = header.seq
+        return True
 
 
 class LogFile:
@@ -61,7 +88,7 @@ class LogFile:
         self.bytes_written = 0
         self.messages = 0
         self.lost = 0
-        self._seqs: dict[tuple[str, str], int] = {}
+        self._streams: dict[tuple[str, str], Stream] = {}
         self._channels: dict[str, int] = {}
         self._schemas: dict[str, int] = {}
         self._writer = Writer(
@@ -92,7 +119,7 @@ class LogFile:
             The sample's header; None for a payload without one, which is recorded all the same.
         """
         header = read_header(sample.payload)
-        if header is not None and not self._in_sequence(sample.key, header):
+        if header is not None and self._is_copy(sample.key, header):
             return header
         self._writer.add_message(
             channel_id=self._channel(sample),
@@ -125,16 +152,17 @@ class LogFile:
         # The raw stream: a buffered one would try again to write what just failed.
         self._stream.raw.close()
 
-    def _in_sequence(self, key: str, header: HeaderFields) -> bool:
-        """Count what is missing before this sample; False if it was recorded before."""
-        stream = (key, header.source)
-        last = self._seqs.get(stream)
-        if last is not None and header.seq <= last:
-            return False
-        if last is not None:
-            self.lost += header.seq - last - 1
-        self._seqs[stream] = header.seq
-        return True
+    def _is_copy(self, key: str, header: HeaderFields) -> bool:
+        """Count what is missing before this sample; True if it was recorded before.
+
+        A copy has number and stamp of a sample that is here; a lower number alone is no reason to
+        leave anything out of the log, whoever sent what before it.
+        """
+        stream = self._streams.setdefault((key, header.source), Stream())
+        if not stream.note(header):
+            return True
+        self.lost += stream.gap
+        return False
 
     def _channel(self, sample: RawSample) -> int:
         if sample.key not in self._channels:

@@ -58,12 +58,14 @@ class RecorderService:
             self._seen.note(sample.key, header.trial, header.tick, header.seq)
 
     def _open(self, request: OpenRequest) -> ResetReply:
+        # The new one first: a folder that can't take it must not cost the log that is open.
+        file = open_log(request, time.time_ns())
         self._finish("superseded")
-        self._file = open_log(request, time.time_ns())
+        self._file = file
         self._seen = Completeness(request.trial)
         self._host.gate.trial = request.trial
         self._publish("recording")
-        self._host.log.info("log opened", path=str(self._file.path), trial=request.trial)
+        self._host.log.info("log opened", path=str(file.path), trial=request.trial)
         return ResetReply(digest=content_digest(request.trial, request.scenario, request.mesh))
 
     def _begin_close(self, pending: Deferred[CloseRequest, CloseReply]) -> None:
@@ -101,7 +103,9 @@ class RecorderService:
         return QUIET_S
 
     def close(self) -> None:
-        """Finish the file; the process ends."""
+        """Write what is still queued and finish the file; the process ends."""
+        while self._host.drain(0.0):
+            pass
         self._finish("stopped")
 
     def _finish(self, reason: str) -> None:

@@ -1,18 +1,8 @@
 """Situation awareness's shell: joins tissue and robot by tick, publishes a verdict on each."""
 
+from fras_common import messages as m
 from fras_common.codec import content_digest
 from fras_common.errors import FrasError
-from fras_common.messages import (
-    Context,
-    ContextRequest,
-    ResetReply,
-    ResetRequest,
-    RobotState,
-    TargetReply,
-    TargetRequest,
-    TissueModel,
-    TissueState,
-)
 from fras_common.scenario import Scenario
 from fras_common.service import Deferred, ServiceHost
 from fras_common.topics import (
@@ -34,11 +24,8 @@ from fras_sa.adapter import (
     verdict_of,
 )
 from fras_sa.awareness import Awareness, AwarenessError, Memory
+from fras_sa.errors import NothingKnown, OtherTrial
 from fras_sa.join import Moment, TickJoin
-
-
-class NothingKnown(FrasError):
-    """No state of this trial has been seen yet."""
 
 
 class AwarenessService:
@@ -59,23 +46,33 @@ class AwarenessService:
     def _begin(self, scenario: Scenario) -> None:
         self._parameters = parameters_of(scenario.awareness)
         self._awareness: Awareness | None = None
+        self._problem: AwarenessError | None = None
         self._memory = Memory()
         self._join = TickJoin()
         self._now: Moment | None = None
-        self._pending: list[Deferred[ContextRequest, Context]] = []
+        self._pending: list[Deferred[m.ContextRequest, m.Context]] = []
 
-    def _reset(self, request: ResetRequest) -> ResetReply:
-        for pending in self._pending:
-            pending.fail(NothingKnown("another trial began"))
+    def _reset(self, request: m.ResetRequest) -> m.ResetReply:
+        self._fail_pending(NothingKnown("another trial began"))
         self._begin(request.scenario)
         self._host.enter_trial(request.trial)
-        return ResetReply(digest=content_digest(request.trial, request.scenario, request.mesh))
+        return m.ResetReply(digest=content_digest(request.trial, request.scenario, request.mesh))
 
-    def _on_model(self, model: TissueModel) -> None:
-        self._awareness = Awareness(self._parameters, model_of(model))
+    def _fail_pending(self, error: FrasError) -> None:
+        waiting, self._pending = self._pending, []
+        for pending in waiting:
+            pending.fail(error)
+
+    def _on_model(self, model: m.TissueModel) -> None:
+        try:
+            self._awareness = Awareness(self._parameters, model_of(model))
+        except AwarenessError as error:
+            self._problem = error
+            self._fail_pending(error)
+            raise
         self._judge_next()
 
-    def _on_state(self, state: TissueState | RobotState) -> None:
+    def _on_state(self, state: m.TissueState | m.RobotState) -> None:
         self._join.add(state)
         self._judge_next()
 
@@ -99,8 +96,14 @@ class AwarenessService:
         for pending in waiting:
             self._on_context_request(pending)
 
-    def _on_context_request(self, pending: Deferred[ContextRequest, Context]) -> None:
+    def _on_context_request(self, pending: Deferred[m.ContextRequest, m.Context]) -> None:
         request = pending.request
+        if request.trial != self._host.gate.trial:
+            pending.fail(OtherTrial(request.trial, self._host.gate.trial))
+            return
+        if self._problem is not None:
+            pending.fail(self._problem)
+            return
         if self._now is None or self._now.tissue.tick < request.min_tick:
             self._pending.append(pending)
             return
@@ -113,7 +116,9 @@ class AwarenessService:
         context = self._context.put(context_of(view, now.tissue, request.request_id))
         pending.reply(context)
 
-    def _target(self, request: TargetRequest) -> TargetReply:
+    def _target(self, request: m.TargetRequest) -> m.TargetReply:
+        if request.trial != self._host.gate.trial:
+            raise OtherTrial(request.trial, self._host.gate.trial)
         awareness, now = self._known()
         target = awareness.target(
             tissue_of(now.tissue),
@@ -123,8 +128,8 @@ class AwarenessService:
             block=request.block,
         )
         if target is None:
-            return TargetReply(position_m=None)
-        return TargetReply(position_m=(float(target[0]), float(target[1]), float(target[2])))
+            return m.TargetReply(position_m=None)
+        return m.TargetReply(position_m=(float(target[0]), float(target[1]), float(target[2])))
 
     def _known(self) -> tuple[Awareness, Moment]:
         if self._awareness is None or self._now is None:

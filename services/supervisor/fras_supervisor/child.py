@@ -8,18 +8,13 @@ from dataclasses import dataclass
 from signal import SIGCONT, SIGKILL, Signals
 from typing import Final
 
+from fras_common.threads import ONE_THREAD
 from fras_supervisor.errors import CommandNotFound
 from fras_supervisor.logs import Echo, LogPump, RotatingFile
 from fras_supervisor.table import Process
 
-ENVIRONMENT: Final = {
-    # Six processes share few cores, and one thread each is what makes a trial repeatable.
-    "OMP_NUM_THREADS": "1",
-    "OPENBLAS_NUM_THREADS": "1",
-    "MKL_NUM_THREADS": "1",
-    "NUMBA_NUM_THREADS": "1",
-    # The same bits from MKL on any CPU and alignment.
-    "MKL_CBWR": "COMPATIBLE",
+ENVIRONMENT: Final[dict[str, str]] = {
+    **ONE_THREAD,
     "PYTHONUNBUFFERED": "1",
     # The service runner then ends the process when its standard input ends.
     "FRAS_PARENT": "stdin",

@@ -32,7 +32,7 @@ class NoAnswer(FrasError):
 
     def __init__(self, key: str, timeout_s: float) -> None:
         super().__init__(
-            f"{key}: no answer within {timeout_s} s; is the service that serves it running?",
+            f"{key}: nobody answered, {timeout_s} s were allowed; is the service running?",
             key=key,
             timeout_s=timeout_s,
         )

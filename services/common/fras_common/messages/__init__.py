@@ -8,6 +8,8 @@ in the names (`_m`, `_n`, `_pa`, `_s`, `_rad`). A published message starts with 
 from fras_common.messages.base import Array, Header, Pose, Quaternion, Vec3
 from fras_common.messages.motion import (
     ActionResult,
+    CancelReply,
+    CancelRequest,
     ExecuteReply,
     ExecuteRequest,
     HoldRequest,
@@ -15,6 +17,7 @@ from fras_common.messages.motion import (
     ResumeRequest,
 )
 from fras_common.messages.planner import (
+    HistoryStep,
     NoPlan,
     Plan,
     PlannedAction,
@@ -40,6 +43,8 @@ __all__ = [
     "ActionState",
     "ArmState",
     "Array",
+    "CancelReply",
+    "CancelRequest",
     "CloseReply",
     "CloseRequest",
     "Context",
@@ -49,6 +54,7 @@ __all__ = [
     "Fault",
     "Header",
     "Health",
+    "HistoryStep",
     "HoldRequest",
     "HoldState",
     "LogRecord",

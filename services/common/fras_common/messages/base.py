@@ -1,6 +1,7 @@
 """What all messages share: the header, arrays, and poses."""
 
 import math
+from collections.abc import Mapping
 from typing import Literal, Self
 
 import msgspec
@@ -98,6 +99,29 @@ class Pose(Wire, frozen=True, kw_only=True):
 
     position_m: Vec3
     quaternion_xyzw: Quaternion
+
+
+Columns = int | Literal["any"] | None
+"""Columns of a two-dimensional array, `any` number of them, or None for a plain list."""
+
+
+def require_arrays(message: Wire, allowed: Mapping[str, tuple[DType, Columns]]) -> None:
+    """Refuse arrays of another type or shape than their fields promise.
+
+    Raises
+    ------
+    ValueError
+        Naming the field; the codec turns it into a `MalformedMessage`.
+    """
+    for name, (dtype, columns) in allowed.items():
+        array: Array = getattr(message, name)
+        rank = 1 if columns is None else 2
+        width_fits = not isinstance(columns, int) or array.shape[1:] == (columns,)
+        if array.dtype != dtype or len(array.shape) != rank or not width_fits:
+            wanted = "(n,)" if columns is None else f"(n, {columns})"
+            raise ValueError(
+                f"{name} is {array.dtype} of shape {array.shape}: expected {dtype}, {wanted}"
+            )
 
 
 def require_finite(what: str, *values: float) -> None:

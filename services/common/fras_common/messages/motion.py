@@ -40,6 +40,19 @@ class ActionResult(Header, frozen=True, kw_only=True):
     reason: str
 
 
+class CancelRequest(Wire, frozen=True, kw_only=True):
+    """End the trial for the arms: no further goal of it, and a running one is stopped."""
+
+    trial: str
+    reason: str
+
+
+class CancelReply(Wire, frozen=True, kw_only=True):
+    """The arms are at rest and nothing of the trial will move them; the last tick."""
+
+    tick: int
+
+
 class HoldRequest(Wire, frozen=True, kw_only=True):
     """Stop; `holder` owns this hold until it is lifted."""
 

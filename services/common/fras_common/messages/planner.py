@@ -19,6 +19,13 @@ class PlannedAction(Wire, frozen=True, kw_only=True):
     expected: list[str]
 
 
+class HistoryStep(Wire, frozen=True, kw_only=True):
+    """Every atom that holds at step `t` of a plan, the action taken at it first."""
+
+    t: int
+    atoms: list[str]
+
+
 class NoPlan(Wire, frozen=True, kw_only=True):
     """Why no plan exists: names of the rules that together forbid one, and the same in words."""
 
@@ -38,7 +45,7 @@ class Plan(Header, frozen=True, kw_only=True):
     actions: list[PlannedAction]
     target: str
     arm: str
-    history: dict[int, list[str]]
+    history: list[HistoryStep]
     cost: list[int]
     models: int
     ground_s: float

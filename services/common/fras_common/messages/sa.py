@@ -40,6 +40,7 @@ class Verdict(Header, frozen=True, kw_only=True):
 class ContextRequest(Wire, frozen=True, kw_only=True):
     """Ask for the context as soon as SA has seen `min_tick`."""
 
+    trial: str
     request_id: str
     min_tick: int
 
@@ -59,6 +60,7 @@ class Context(Header, frozen=True, kw_only=True):
 class TargetRequest(Wire, frozen=True, kw_only=True):
     """Ask where `arm` must go for an action."""
 
+    trial: str
     action: str
     arm: str
     block: str

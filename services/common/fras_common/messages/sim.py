@@ -1,6 +1,17 @@
 """What the tissue simulator publishes."""
 
-from fras_common.messages.base import Array, Header, Vec3, Wire
+from collections.abc import Mapping
+from typing import ClassVar
+
+from fras_common.messages.base import (
+    Array,
+    Columns,
+    DType,
+    Header,
+    Vec3,
+    Wire,
+    require_arrays,
+)
 
 
 class TissueModel(Header, frozen=True, kw_only=True):
@@ -10,8 +21,8 @@ class TissueModel(Header, frozen=True, kw_only=True):
     ----------
     nodes_m : Array, shape (n_nodes, 3), float64
         Rest positions in the world frame.
-    elements : Array, shape (n_elements, 8), int32
-        Hexahedra in VTK order.
+    elements : Array, shape (n_elements, 8, 4 or 10), int32
+        Hexahedra, linear or quadratic tetrahedra, in VTK's order.
     surface : Array, shape (n_triangles, 3), int32
         Outer faces, wound outwards.
     fixed_nodes : Array, shape (n_fixed,), int32
@@ -29,6 +40,17 @@ class TissueModel(Header, frozen=True, kw_only=True):
     young_modulus_pa: float
     poisson_ratio: float
     dt_s: float
+
+    ARRAYS: ClassVar[Mapping[str, tuple[DType, Columns]]] = {
+        "nodes_m": ("<f8", 3),
+        "elements": ("<i4", "any"),
+        "surface": ("<i4", 3),
+        "fixed_nodes": ("<i4", None),
+        "fixed_points_m": ("<f8", 3),
+    }
+
+    def __post_init__(self) -> None:
+        require_arrays(self, self.ARRAYS)
 
 
 class SolverReport(Wire, frozen=True, kw_only=True):
@@ -65,3 +87,11 @@ class TissueState(Header, frozen=True, kw_only=True):
     tool_force_n: dict[str, Vec3]
     grasped: dict[str, list[int]]
     solver: SolverReport
+
+    ARRAYS: ClassVar[Mapping[str, tuple[DType, Columns]]] = {
+        "nodes_m": ("<f4", 3),
+        "nodal_force_n": ("<f4", 3),
+    }
+
+    def __post_init__(self) -> None:
+        require_arrays(self, self.ARRAYS)

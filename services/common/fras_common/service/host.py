@@ -67,6 +67,10 @@ class Deferred(Generic[Req, Rep]):
         self._host.post(lambda: self._host.publish_mirror(self._query, record))
 
 
+class InternalFault(FrasError):
+    """A query met a mistake of our own; the server's log has the traceback."""
+
+
 class ServiceHost:
     """Connects one service to its bus.
 
@@ -261,6 +265,9 @@ class ServiceHost:
             reply = handler(pending.request)
         except FrasError as error:
             pending.fail(error)
+        except Exception as error:
+            self.log.exception("a query failed unexpectedly")
+            pending.fail(InternalFault(f"{type(error).__name__}: {error}"))
         else:
             pending.reply(reply)
 
@@ -280,7 +287,12 @@ class ServiceHost:
         if topic.in_trial and not self.gate.admit((topic, handler), message):
             return
         self.counts["received"] += 1
-        handler(message)
+        try:
+            handler(message)
+        except FrasError as error:
+            # Refused for what it says; anything else is our own mistake and ends the process.
+            self.counts["refused"] += 1
+            self.log.error("message refused", key=topic.key, problem=str(error))
 
     def _on_token(self, token: str, present: bool) -> None:
         name, _, instance = token.rpartition("/")

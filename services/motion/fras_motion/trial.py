@@ -1,0 +1,82 @@
+"""One trial's worth of motion: its goals, taken until it is cancelled, and what holds the arms."""
+
+from typing import Final
+
+from fras_motion.controller import MotionController
+from fras_motion.errors import Refused
+from fras_motion.holds import Holds
+from fras_motion.parameters import MotionParameters
+from fras_motion.states import ActionResult, Goal, Verdict
+
+CANCELLER: Final = "cancel"
+"""Holder of motion's own hold, by which it brings a cancelled action to rest."""
+
+
+class MotionTrial:
+    """A controller, the goal under way, and whether more are taken.
+
+    Parameters
+    ----------
+    name : str
+        The trial's.
+    parameters : MotionParameters
+    holds : Holds
+        What others hold; it outlives the trial.
+    """
+
+    def __init__(self, name: str, parameters: MotionParameters, holds: Holds) -> None:
+        self.name = name
+        self.controller = MotionController(parameters)
+        self.goal: Goal | None = None
+        self._holds = holds
+        self._open = True
+        self.impose_holds()
+
+    @property
+    def tick(self) -> int:
+        """The tick at which the arms stand."""
+        return self.controller.snapshot.tick
+
+    def execute(self, trial: str, goal: Goal) -> None:
+        """Begin an action.
+
+        Raises
+        ------
+        Refused
+            The goal is of another trial or of one that was cancelled, or motion can't do it.
+        """
+        if trial != self.name or not self._open:
+            raise Refused("another_trial", f"{trial!r}; motion serves {self.name!r}", trial=trial)
+        self.controller.execute(goal)
+        self.goal = goal
+
+    def may_tick(self, verdict: Verdict | None) -> bool:
+        """Whether a tick is wanted and its verdict is there."""
+        return self.controller.wants_tick and verdict is not None and verdict.tick == self.tick
+
+    def cancel(self, reason: str) -> None:
+        """Take no more goals, and bring the one under way to rest."""
+        self._open = False
+        if self.goal is not None:
+            self.controller.hold(CANCELLER, reason)
+
+    def end(self, reason: str) -> ActionResult | None:
+        """End the action under way at the tick where the arms stand."""
+        result = self.controller.abort(reason)
+        self.controller.resume(CANCELLER)
+        return result
+
+    def impose_holds(self) -> bool:
+        """Make the controller's holds those in force; True if that changed anything."""
+        wanted = self._holds.current()
+        standing = {
+            holder: reason
+            for holder, reason in self.controller.snapshot.holds.items()
+            if holder != CANCELLER
+        }
+        for holder, reason in wanted.items():
+            if standing.get(holder) != reason:
+                self.controller.hold(holder, reason)
+        for holder in standing.keys() - wanted.keys():
+            self.controller.resume(holder)
+        return wanted != standing
