@@ -3,6 +3,7 @@
 import os
 from pathlib import Path
 
+import msgspec
 import psutil
 import pytest
 
@@ -21,7 +22,7 @@ def test_record_is_found_while_its_process_lives(tmp_path: Path) -> None:
     assert runtime.find("other") is None
     with pytest.raises(runtime.StackExists, match=str(os.getpid())):
         runtime.keep("local", "tcp/127.0.0.1:2", tmp_path)
-    runtime.forget("local")
+    runtime.forget(kept)
     assert runtime.find("local") is None
     with pytest.raises(runtime.NoStack, match="fras up --cell local"):
         runtime.require("local")
@@ -37,6 +38,26 @@ def test_record_of_a_process_that_is_gone_is_removed(tmp_path: Path, pid: int) -
     path.write_text(text.replace(str(created_s), "1.5"))
     assert runtime.find("local") is None
     assert not path.exists()
+
+
+def test_only_its_owner_forgets_a_record(tmp_path: Path) -> None:
+    kept = runtime.keep("local", "tcp/127.0.0.1:1", tmp_path)
+    other = msgspec.structs.replace(kept, connect="tcp/127.0.0.1:2")
+    runtime.forget(other)
+    assert runtime.find("local") == kept
+
+
+def test_record_outlives_a_step_of_the_clock(tmp_path: Path) -> None:
+    kept = runtime.keep("local", "tcp/127.0.0.1:1", tmp_path)
+    path = runtime.runtime_dir() / "local.json"
+    path.write_text(path.read_text().replace(str(kept.created_s), str(kept.created_s + 2.0)))
+    assert runtime.find("local") is not None
+
+
+@pytest.mark.parametrize("cell", ["", "a/b", "..", "a b", "**"])
+def test_bad_cell_is_named(cell: str) -> None:
+    with pytest.raises(runtime.BadCell, match="allowed"):
+        runtime.find(cell)
 
 
 def test_damaged_record_is_no_stack(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 import psutil
 import pytest
 
-from fras_cli.options import build_scenario
+from fras_cli.options import build_trial
 from fras_cli.report import Summary, write_report
 from fras_cli.stack import UsedStack, own_stack
 from fras_cli.trial import TrialFollower, TrialView
@@ -53,18 +53,19 @@ class Trials:
         self._folder = folder
         self._count = 0
 
-    def start(self, scenario: Scenario) -> Path:
+    def start(self, scenario: Scenario, mesh: bytes = b"") -> Path:
         """Begin a trial; returns its folder."""
         self._count += 1
         folder = self._folder / f"trial-{self._count}"
-        self.follower.start(f"trial-{self._count}", scenario, folder)
+        self.follower.start(f"trial-{self._count}", scenario, folder, mesh)
         return folder
 
     def run(
         self, name: str, look: Callable[[TrialView], None] = lambda view: None, **options: Any
     ) -> tuple[Summary, Path]:
         """Run a trial to its end; returns its summary and its log."""
-        folder = self.start(build_scenario(name, pace=0, **options))
+        trial = build_trial(name, pace=0, **options)
+        folder = self.start(trial.scenario, trial.mesh)
         assert self.follower.follow(look, stop=lambda: False)
         return write_report(folder / "audit.mcap", folder), folder / "audit.mcap"
 

@@ -56,7 +56,9 @@ def test_ctrl_c_in_mid_pull_leaves_a_readable_log_and_no_process(
     assert command.alone()
     assert summary_of(tmp_path / "out")["outcome"] == "aborted"
     assert summary_of(tmp_path / "out")["complete"]
-    assert messages(tmp_path / "out" / "audit.mcap", "motion/action_result")[-1].reason == "hold"
+    assert (
+        messages(tmp_path / "out" / "audit.mcap", "motion/action_result")[-1].reason == "cancelled"
+    )
     assert not list((tmp_path / "out").glob(".*"))
 
 
@@ -82,8 +84,10 @@ def test_service_that_dies_in_mid_trial_is_named_and_the_log_is_readable(
     simulator = next(one for one in command.note_family() if "fras_sim" in one.cmdline())
     simulator.kill()
     assert command.end() == 3
-    assert "sim" in command.text.splitlines()[-1]
+    assert "sim ended with status -9" in command.text
     assert command.alone()
+    assert summary_of(tmp_path / "out")["outcome"] == "aborted"
+    assert (tmp_path / "out" / "report.html").exists()
     assert len(read_trial(tmp_path / "out" / "audit.mcap").robot) > 50
 
 
@@ -182,6 +186,22 @@ def test_log_is_never_written_over(fras: Fras, tmp_path: Path) -> None:
     assert command.end() == 2
     assert "never written over" in command.text
     assert (tmp_path / "out" / "audit.mcap").read_text() == "precious"
+
+
+def test_run_on_a_stack_that_goes_away_ends_and_says_so(fras: Fras, tmp_path: Path) -> None:
+    from fras_supervisor import free_port
+
+    stack = fras("up", "--cell", "doomed", "--port", str(free_port()))
+    stack.until("ready after")
+    run = fras("run", "a", "--cell", "doomed", "--out", "out")
+    run.until("lifting")
+    next(one for one in stack.note_family() if "fras_sim" in one.cmdline()).kill()
+    assert stack.end() == 3
+    assert "sim ended with status -9" in stack.text
+    assert run.end() == 3
+    assert "have gone" in run.text
+    assert stack.alone()
+    assert summary_of(tmp_path / "out")["outcome"] == "aborted"
 
 
 def test_scenario_new_is_one_that_runs_the_same(fras: Fras, tmp_path: Path) -> None:

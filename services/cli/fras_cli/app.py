@@ -68,12 +68,12 @@ def run(
     ] = None,
 ) -> None:
     """Run a trial: the stack of `fras up` if there is one in the cell, else an own one."""
-    from fras_cli.options import build_scenario, parse_seeds
+    from fras_cli.options import build_trial, parse_seeds
     from fras_cli.run import default_out, run_trials
 
     chosen = list(parse_seeds(seeds)) if seeds is not None else [seed]
-    scenarios = [
-        build_scenario(
+    trials = [
+        build_trial(
             scenario,
             seed=one,
             pace=pace,
@@ -84,10 +84,11 @@ def run(
         )
         for one in chosen
     ]
-    folder = out or default_out(seeds or str(scenarios[0].seed))
+    folder = out or default_out(seeds or str(trials[0].scenario.seed))
     raise typer.Exit(
         run_trials(
-            scenarios,
+            [trial.scenario for trial in trials],
+            mesh=trials[0].mesh,
             out=folder,
             cell=cell,
             connect=connect,
@@ -201,7 +202,9 @@ def scenario_check(
     from fras_cli.options import build_scenario
 
     checked = build_scenario(scenario)
-    _console().print(f"{scenario}: fine; seed {checked.seed}, {checked.tissue.node_counts} nodes")
+    tissue = checked.tissue
+    mesh = tissue.mesh_file or f"{tissue.node_counts} nodes"
+    _console().print(f"{scenario}: fine; seed {checked.seed}, {mesh}")
 
 
 def _service(name: str, help_text: str) -> None:

@@ -8,7 +8,7 @@ from fras_cli.run import (
     EXIT_STACK,
     FolderInUse,
 )
-from fras_cli.runtime import NoStack, StackExists
+from fras_cli.runtime import BadCell, NoStack, StackExists
 from fras_cli.stack import StackIncomplete
 from fras_cli.trial import StackDied, TrialRefused
 from fras_common.bus import NoAnswer
@@ -53,7 +53,7 @@ def exit_status(error: FrasError) -> int:
     """2 for bad input, 3 for a stack that fails, 130 if interrupted, 1 for the rest."""
     if isinstance(error, StartCancelled):
         return EXIT_INTERRUPTED
-    if isinstance(error, (ScenarioError, FolderInUse)):
+    if isinstance(error, (ScenarioError, FolderInUse, BadCell)):
         return EXIT_BAD_INPUT
     if isinstance(error, STACK_ERRORS):
         return EXIT_STACK

@@ -32,7 +32,7 @@ class DownTimeout(FrasError):
 def up(cell: str, port: int, log_dir: Path, console: Console) -> int:
     """Start a stack and keep it until Ctrl-C, `fras down`, or the death of a process."""
     connect = f"tcp/127.0.0.1:{port}"
-    runtime.keep(cell, connect, log_dir)
+    record = runtime.keep(cell, connect, log_dir)
     try:
         with caught_interrupts() as interrupts, Lines(sys.stdout, ["router", *SERVICES]) as echo:
             began_s = time.monotonic()
@@ -46,14 +46,13 @@ def up(cell: str, port: int, log_dir: Path, console: Console) -> int:
                     f"logs in {log_dir}; Ctrl-C or `fras down --cell {cell}` stops it"
                 )
                 while not stopping():
-                    if dead := stack.watch():
-                        for one in dead:
-                            console.print(f"{one}", style="bold red")
+                    if gone := stack.watch():
+                        console.print(gone, style="bold red")
                         return EXIT_STACK
                     time.sleep(POLL_S)
                 console.print("stopping", style="dim")
     finally:
-        runtime.forget(cell)
+        runtime.forget(record)
     return EXIT_OK
 
 
@@ -138,7 +137,7 @@ def hold(cell: str, connect: str | None, reason: str, console: Console) -> int:
         request = HoldRequest(holder=HOLDER, reason=reason)
         state = link.bus.query(HOLD, request, QUERY_TIMEOUT_S)
         took_ms = (time.monotonic() - began_s) * 1e3
-    console.print(f"stopped at tick {state.tick}, acknowledged after {took_ms:.1f} ms")
+    console.print(f"stop acknowledged at tick {state.tick} after {took_ms:.1f} ms")
     _print_holds(state, console)
     return EXIT_OK
 

@@ -1,10 +1,13 @@
 """From a file and the command line's options to one checked, resolved scenario."""
 
+import os
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
+from fras_cli.mesh_input import mesh_path, read_mesh_file
 from fras_common.scenario import Scenario, ScenarioError, check, load, resolve, to_toml
 from fras_common.scenario.loader import convert
 
@@ -65,6 +68,21 @@ def parse_seeds(text: str) -> range:
     return range(int(first), int(last) + 1)
 
 
+@dataclass(frozen=True)
+class TrialInput:
+    """What a trial is started with: a checked, resolved scenario, its mesh file's content or none.
+
+    Parameters
+    ----------
+    mesh_path : Path or None
+        Where the mesh was read.
+    """
+
+    scenario: Scenario
+    mesh: bytes = b""
+    mesh_path: Path | None = None
+
+
 def build_scenario(
     file: str,
     *,
@@ -75,7 +93,29 @@ def build_scenario(
     criterion: str | None = None,
     mesh: str | None = None,
 ) -> Scenario:
-    """Read a scenario, lay the options over it, check it, and draw its scene if it has none.
+    """Make the scenario alone, as `build_trial` does."""
+    return build_trial(
+        file,
+        seed=seed,
+        pace=pace,
+        ignore_ap=ignore_ap,
+        no_limit=no_limit,
+        criterion=criterion,
+        mesh=mesh,
+    ).scenario
+
+
+def build_trial(
+    file: str,
+    *,
+    seed: int | None = None,
+    pace: float | None = None,
+    ignore_ap: bool = False,
+    no_limit: bool = False,
+    criterion: str | None = None,
+    mesh: str | None = None,
+) -> TrialInput:
+    """Read a scenario and its mesh, lay the options over it, check it, draw its scene if need be.
 
     A `seed` given here draws a new scene, also where the file holds one.
 
@@ -84,8 +124,8 @@ def build_scenario(
     ScenarioError
         Naming the file or the command line, the key, the value and what is allowed.
     """
-    scenario = load(find_scenario(file))
-    raw: dict[str, Any] = msgspec.to_builtins(scenario)
+    path = find_scenario(file)
+    raw: dict[str, Any] = msgspec.to_builtins(load(path))
     if seed is not None:
         raw["seed"] = seed
         raw["scene"] = None
@@ -99,7 +139,15 @@ def build_scenario(
         raw["planner"]["criterion"] = criterion
     if mesh is not None:
         raw["tissue"]["node_counts"] = parse_mesh(mesh)
-    return resolve(check(convert(raw, COMMAND_LINE), COMMAND_LINE))
+    scenario = convert(raw, COMMAND_LINE)
+    if scenario.tissue.mesh_file is None:
+        return TrialInput(resolve(check(scenario, COMMAND_LINE)))
+    if mesh is not None:
+        raise ScenarioError(
+            COMMAND_LINE, "--mesh", mesh, f"is for the box, and {path} has a mesh_file"
+        )
+    fitted, data = read_mesh_file(scenario, path)
+    return TrialInput(resolve(fitted), data, mesh_path(scenario, path))
 
 
 def write_new_scenario(base: str, seed: int, out: Path | None) -> None:
@@ -110,7 +158,14 @@ def write_new_scenario(base: str, seed: int, out: Path | None) -> None:
     ScenarioError
         If the file exists or can't be written.
     """
-    text = to_toml(build_scenario(base, seed=seed))
+    trial = build_trial(base, seed=seed)
+    scenario = trial.scenario
+    if trial.mesh_path is not None:
+        # The new file's reader looks for the mesh from where that file is.
+        there = Path(os.path.relpath(trial.mesh_path, (out or Path("new.toml")).parent))
+        tissue = msgspec.structs.replace(scenario.tissue, mesh_file=there.as_posix())
+        scenario = msgspec.structs.replace(scenario, tissue=tissue)
+    text = to_toml(scenario)
     if out is None:
         print(text, end="")
         return

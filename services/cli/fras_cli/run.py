@@ -15,7 +15,7 @@ from rich.console import Console
 from fras_cli.display import LiveDisplay, print_summary
 from fras_cli.report import Summary, write_report
 from fras_cli.stack import UsedStack, use_stack
-from fras_cli.trial import TrialFollower
+from fras_cli.trial import StackDied, TrialFollower
 from fras_common.bus import NoAnswer
 from fras_common.errors import FrasError
 from fras_common.scenario import Scenario, to_toml
@@ -92,6 +92,7 @@ def run_trials(
     port: int | None,
     console: Console,
     as_json: bool,
+    mesh: bytes = b"",
 ) -> int:
     """Run the scenarios one after the other through one stack.
 
@@ -107,6 +108,8 @@ def run_trials(
         For people.
     as_json : bool
         Print the summaries to standard output, one JSON object a trial.
+    mesh : bytes
+        Content of the mesh file that the scenarios name.
 
     Returns
     -------
@@ -116,7 +119,9 @@ def run_trials(
     folders = trial_folders(scenarios, out)
     out.mkdir(parents=True, exist_ok=True)
     outcomes: list[str] = []
+    under_way: list[Path] = []
     with (
+        _told_of_the_dead(under_way, console),
         caught_interrupts() as interrupts,
         use_stack(
             cell,
@@ -131,7 +136,9 @@ def run_trials(
         for scenario, folder in zip(scenarios, folders, strict=True):
             if not stack.own:
                 scenario = without_hold_timeout(scenario)
-            summary = _one_trial(follower, scenario, folder, console, interrupts)
+            under_way.append(folder)
+            _one_trial(follower, scenario, mesh, folder, console, interrupts)
+            summary = _report(under_way.pop(), console)
             outcomes.append(summary.outcome)
             if as_json:
                 print(msgspec.json.encode(summary).decode(), flush=True)
@@ -146,18 +153,33 @@ def run_trials(
     return EXIT_OK if all(one == "success" for one in outcomes) else EXIT_NOT_SUCCESS
 
 
+@contextmanager
+def _told_of_the_dead(under_way: list[Path], console: Console) -> Generator[None]:
+    """Report on the trial that a dying stack took with it: what its log holds is readable."""
+    try:
+        yield
+    except StackDied:
+        for folder in under_way:
+            if (folder / LOG).exists():
+                _report(folder, console)
+        raise
+
+
 def _one_trial(
     follower: TrialFollower,
     scenario: Scenario,
+    mesh: bytes,
     folder: Path,
     console: Console,
     interrupts: Interrupts,
-) -> Summary:
+) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "scenario.toml").write_text(to_toml(scenario), encoding="utf-8")
+    if scenario.tissue.mesh_file is not None:
+        (folder / scenario.tissue.mesh_file).write_bytes(mesh)
     trial = f"{datetime.now(UTC).strftime('%Y%m%d-%H%M%S')}-{scenario.seed}"
     console.print(f"trial {trial}: scenario {scenario.name}, seed {scenario.seed}")
-    follower.start(trial, scenario, folder)
+    follower.start(trial, scenario, folder, mesh)
     with LiveDisplay(console) as display:
         if not follower.follow(display.show, stop=lambda: interrupts.count > 0):
             seen = interrupts.count
@@ -166,6 +188,9 @@ def _one_trial(
                 follower.follow(display.show, stop=lambda: interrupts.count > seen)
             except NoAnswer as error:
                 console.print(f"the trial could not be ended in order: {error}", style="red")
+
+
+def _report(folder: Path, console: Console) -> Summary:
     console.print("writing the report", style="dim")
     began_s = time.monotonic()
     summary = write_report(folder / LOG, folder)

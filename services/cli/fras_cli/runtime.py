@@ -1,6 +1,7 @@
 """The stacks that `fras up` keeps running on this machine: one small file a cell."""
 
 import os
+import re
 import tempfile
 from pathlib import Path
 
@@ -9,6 +10,9 @@ import psutil
 
 from fras_common.errors import FrasError
 
+CELL_NAME = re.compile(r"[A-Za-z0-9_-]+")
+CLOCK_STEP_S = 3600.0
+
 
 class NoStack(FrasError):
     """No stack runs in the cell."""
@@ -16,6 +20,10 @@ class NoStack(FrasError):
 
 class StackExists(FrasError):
     """A stack runs in the cell already."""
+
+
+class BadCell(FrasError):
+    """A cell's name that can't be part of a key or of a file's name."""
 
 
 class StackRecord(msgspec.Struct, frozen=True, kw_only=True):
@@ -42,9 +50,34 @@ def runtime_dir() -> Path:
     return folder
 
 
+def record_path(cell: str) -> Path:
+    """File of a cell's record.
+
+    Raises
+    ------
+    BadCell
+        If the name holds anything but letters, digits, dots, dashes and underscores.
+    """
+    if not CELL_NAME.fullmatch(cell):
+        raise BadCell(
+            f"cell {cell!r}: letters, digits, dashes and underscores are allowed", cell=cell
+        )
+    return runtime_dir() / f"{cell}.json"
+
+
+def is_alive(record: StackRecord) -> bool:
+    """Whether the process of the record runs, and is not another one with a reused id."""
+    try:
+        created_s = psutil.Process(record.pid).create_time()
+    except psutil.NoSuchProcess:
+        return False
+    # Creation times count from the boot time, which moves when the clock is set.
+    return abs(created_s - record.created_s) < CLOCK_STEP_S
+
+
 def find(cell: str) -> StackRecord | None:
     """Find the record of a running stack; one whose process is gone is removed."""
-    path = runtime_dir() / f"{cell}.json"
+    path = record_path(cell)
     try:
         record = msgspec.json.decode(path.read_bytes(), type=StackRecord)
     except FileNotFoundError:
@@ -52,11 +85,7 @@ def find(cell: str) -> StackRecord | None:
     except msgspec.DecodeError:
         path.unlink(missing_ok=True)
         return None
-    try:
-        alive = psutil.Process(record.pid).create_time() == record.created_s
-    except psutil.NoSuchProcess:
-        alive = False
-    if not alive:
+    if not is_alive(record):
         path.unlink(missing_ok=True)
         return None
     return record
@@ -99,13 +128,20 @@ def keep(cell: str, connect: str, log_dir: Path) -> StackRecord:
         connect=connect,
         log_dir=str(log_dir),
     )
-    path = runtime_dir() / f"{cell}.json"
+    path = record_path(cell)
     temporary = path.with_suffix(f".{me.pid}")
     temporary.write_bytes(msgspec.json.encode(record))
-    temporary.replace(path)
+    try:
+        # Unlike a rename this fails if somebody was quicker.
+        path.hardlink_to(temporary)
+    except FileExistsError as error:
+        raise StackExists(f"cell {cell!r}: another stack is just starting", pid=0) from error
+    finally:
+        temporary.unlink()
     return record
 
 
-def forget(cell: str) -> None:
-    """Remove the record of this cell."""
-    (runtime_dir() / f"{cell}.json").unlink(missing_ok=True)
+def forget(record: StackRecord) -> None:
+    """Remove this record, if it is still the cell's."""
+    if find(record.cell) == record:
+        record_path(record.cell).unlink(missing_ok=True)

@@ -13,6 +13,7 @@ from fras_supervisor import Exit, Stack, find_table, free_port, load_table
 from fras_supervisor.logs import Echo
 
 COMPLETE_TIMEOUT_S = 5.0
+ABSENCE_S = 3.0
 
 
 class StackIncomplete(FrasError):
@@ -33,14 +34,47 @@ class UsedStack:
     own : bool
         Whether this command started it.
     watch : callable
-        Processes of an own stack that have ended.
+        What of the stack has gone, in words; empty while all is there.
     """
 
     link: Link
     started_ns: int
     log_dir: Path | None
     own: bool
-    watch: Callable[[], tuple[Exit, ...]]
+    watch: Callable[[], str]
+
+
+def in_words(ended: tuple[Exit, ...]) -> str:
+    """Tell which processes have ended, and with what last words."""
+    return "; ".join(
+        f"{one.name} ended with status {one.returncode}"
+        + (f": {one.last_lines[-1]}" if one.last_lines else "")
+        for one in ended
+    )
+
+
+class Absence:
+    """Watches a stack that others keep: a service that stays away has gone.
+
+    Parameters
+    ----------
+    link : Link
+    """
+
+    def __init__(self, link: Link) -> None:
+        self._link = link
+        self._since_s: float | None = None
+
+    def look(self) -> str:
+        """Name the services that have been away for too long; empty while all are there."""
+        missing = self._link.missing()
+        if not missing:
+            self._since_s = None
+            return ""
+        now_s = time.monotonic()
+        self._since_s = self._since_s or now_s
+        gone = now_s - self._since_s >= ABSENCE_S
+        return f"{', '.join(missing)} of cell {self._link.cell} have gone" if gone else ""
 
 
 @contextmanager
@@ -71,10 +105,14 @@ def own_stack(
         stack = Stack(table, cell, endpoint, log_dir, link.tokens, cancelled=cancelled, echo=echo)
         stack.start()
         try:
-            yield UsedStack(link, started_ns, log_dir, own=True, watch=stack.watch)
+            yield UsedStack(
+                link, started_ns, log_dir, own=True, watch=lambda: in_words(stack.watch())
+            )
         finally:
-            link.close()
-            stack.stop()
+            try:
+                link.close()
+            finally:
+                stack.stop()
 
 
 @contextmanager
@@ -92,7 +130,7 @@ def running_stack(cell: str, connect: str, log_dir: Path | None) -> Generator[Us
                 f"cell {cell!r} at {connect}: not ready: {', '.join(link.missing())}",
                 missing=link.missing(),
             )
-        yield UsedStack(link, 0, log_dir, own=False, watch=lambda: ())
+        yield UsedStack(link, 0, log_dir, own=False, watch=Absence(link).look)
 
 
 @contextmanager

@@ -68,7 +68,7 @@ class TrialFollower:
         bus.subscribe(ROBOT_STATE, self._on_robot)
         bus.subscribe(HEALTH, self._on_health)
 
-    def start(self, trial: str, scenario: Scenario, out_dir: Path) -> None:
+    def start(self, trial: str, scenario: Scenario, out_dir: Path, mesh: bytes = b"") -> None:
         """Ask the planner to begin.
 
         Raises
@@ -84,6 +84,7 @@ class TrialFollower:
             command="start",
             trial=trial,
             scenario=scenario,
+            mesh=mesh,
             out_dir=str(out_dir.resolve()),
             started_ns=self._started_ns,
         )
@@ -119,9 +120,8 @@ class TrialFollower:
                 return True
             if stop():
                 return False
-            if dead := self._stack.watch():
-                names = "; ".join(str(one) for one in dead)
-                raise StackDied(f"ended in mid-trial: {names}")
+            if gone := self._stack.watch():
+                raise StackDied(f"in mid-trial: {gone}")
 
     def _update(self, **changes: object) -> None:
         with self._changed:

@@ -5,26 +5,80 @@ from numpy.typing import NDArray
 
 from fras_common.errors import FrasError
 from fras_common.messages import Array, RobotState, SolverReport, TissueModel, TissueState, Vec3
-from fras_common.scenario import Scenario, attachment_raster, nodes_in_discs
-from fras_sim.fem import StepResult, TissueParameters, TissueSimulator, ToolInput, box_mesh
+from fras_common.scenario import (
+    Scenario,
+    SceneSection,
+    attachment_raster,
+    fit_to_mesh,
+    nodes_in_discs,
+)
+from fras_common.scenario.mesh import SIZE_ROUNDING_M
+from fras_common.service.extras import require_extra
+from fras_sim.fem import Mesh, StepResult, TissueParameters, TissueSimulator, ToolInput, box_mesh
+from fras_sim.fem.underside import underside_height
 
 
 class UnresolvedScenario(FrasError):
     """A scenario without a scene: whoever starts a trial draws it."""
 
 
-def build_simulator(scenario: Scenario) -> TissueSimulator:
+class MeshMismatch(FrasError):
+    """A scenario and the mesh that came with it are not about the same tissue."""
+
+
+def build_mesh(scenario: Scenario, data: bytes) -> Mesh:
+    """Make the mesh of a scenario's tissue: the box, or what the bytes of its mesh file hold.
+
+    Raises
+    ------
+    MeshMismatch
+        Bytes without a mesh file named, or the other way round; another size than the scenario's.
+    ScenarioError
+        The element is not one for the mesh.
+    MeshFileError, BadMesh
+        See `mesh_file.read_mesh`.
+    """
+    tissue = scenario.tissue
+    if (tissue.mesh_file is not None) != bool(data):
+        raise MeshMismatch(
+            f"tissue.mesh_file = {tissue.mesh_file!r} came with {len(data)} bytes of mesh: send a "
+            "mesh file's name and its content together"
+        )
+    if tissue.mesh_file is None:
+        return box_mesh(tissue.size_m, tissue.node_counts)
+    # Boxes need no meshio, and start-up need not wait for it.
+    with require_extra("sim"):
+        from fras_sim.mesh_file import mesh_facts, read_mesh
+    mesh = read_mesh(data, tissue.mesh_file, tissue.mesh_scale)
+    size_m = fit_to_mesh(scenario, mesh_facts(mesh)).tissue.size_m
+    if not np.allclose(size_m, tissue.size_m, rtol=0.0, atol=SIZE_ROUNDING_M):
+        raise MeshMismatch(
+            f"tissue.size_m = {tissue.size_m}, and the mesh's bounding box is {size_m}: fit the "
+            "scenario to its mesh before the reset (fras_common.scenario.fit_to_mesh)"
+        )
+    return mesh
+
+
+def build_simulator(scenario: Scenario, data: bytes = b"") -> TissueSimulator:
     """Make the tissue of a resolved scenario, at rest.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    data : bytes
+        The content of its mesh file, where it names one.
 
     Raises
     ------
     UnresolvedScenario
         If the scenario has no scene.
+    MeshMismatch, ScenarioError, MeshFileError, BadMesh
+        See `build_mesh`.
     """
     tissue, scene = scenario.tissue, scenario.scene
     if scene is None:
         raise UnresolvedScenario("the scenario has no scene: resolve it before the reset")
-    mesh = box_mesh(tissue.size_m, tissue.node_counts)
+    mesh = build_mesh(scenario, data)
     parameters = TissueParameters(
         young_modulus_pa=tissue.young_modulus_pa,
         poisson_ratio=tissue.poisson_ratio,
@@ -32,9 +86,23 @@ def build_simulator(scenario: Scenario) -> TissueSimulator:
         dt_s=tissue.dt_s,
         gravity=tissue.gravity,
         bed=tissue.bed,
+        element=tissue.element,
+        material=tissue.material,
     )
     fixed_nodes = nodes_in_discs(mesh.nodes_m, mesh.bottom_nodes, scene.discs)
     return TissueSimulator(mesh, parameters, fixed_nodes)
+
+
+def fixed_points(mesh: Mesh, scenario: Scenario, scene: SceneSection) -> NDArray[np.float64]:
+    """Return the attachment points, shape (n_points, 3) [m].
+
+    On a mesh from a file they lie on its underside; those beside the tissue are left out.
+    """
+    points_m = attachment_raster(scenario.tissue.size_m, scene.discs)
+    if scenario.tissue.mesh_file is None:
+        return points_m
+    points_m[:, 2] = underside_height(mesh, points_m[:, :2])
+    return points_m[np.isfinite(points_m[:, 2])]
 
 
 def tissue_model(simulator: TissueSimulator, scenario: Scenario, trial: str) -> TissueModel:
@@ -49,7 +117,7 @@ def tissue_model(simulator: TissueSimulator, scenario: Scenario, trial: str) -> 
         elements=Array.of(mesh.elements, "<i4"),
         surface=Array.of(mesh.surface, "<i4"),
         fixed_nodes=Array.of(simulator.fixed_nodes, "<i4"),
-        fixed_points_m=Array.of(attachment_raster(scenario.tissue.size_m, scene.discs), "<f8"),
+        fixed_points_m=Array.of(fixed_points(mesh, scenario, scene), "<f8"),
         roi_m=scene.roi_m,
         young_modulus_pa=scenario.tissue.young_modulus_pa,
         poisson_ratio=scenario.tissue.poisson_ratio,

@@ -2,12 +2,14 @@
 
 import time
 
+import msgspec
+
 from fras_common.codec import content_digest
 from fras_common.messages import ResetReply, ResetRequest, RobotState, TissueState
 from fras_common.service import ServiceHost
 from fras_common.topics import ROBOT_STATE, SIM_RESET, TISSUE_MODEL, TISSUE_STATE
 from fras_sim.adapter import build_simulator, tissue_model, tissue_state, tools_of
-from fras_sim.fem import BadToolInput, TissueSimulator, compile_kernels
+from fras_sim.fem import BadToolInput, FemError, TissueSimulator, compile_kernels
 
 
 class SimService:
@@ -26,7 +28,7 @@ class SimService:
         host.serve(SIM_RESET, self._reset)
 
     def _reset(self, request: ResetRequest) -> ResetReply:
-        self._simulator = build_simulator(request.scenario)
+        self._simulator = build_simulator(request.scenario, request.mesh)
         self._last = None
         self._host.facts["linear_solver"] = self._simulator.solver_name
         self._model.put(tissue_model(self._simulator, request.scenario, request.trial))
@@ -55,6 +57,10 @@ class SimService:
         except BadToolInput as error:
             self._host.log.error("tool pose refused, tissue unchanged", problem=str(error))
             return
+        except FemError as error:
+            self._host.log.error("step failed, state kept", tick=robot.tick, problem=str(error))
+            self._keep_state(robot.tick)
+            return
         wall_s = time.perf_counter() - began_s
         if not result.solver.converged:
             self._host.log.error(
@@ -65,6 +71,14 @@ class SimService:
             )
         self._last = tissue_state(result, robot.tick, robot.trial, wall_s)
         self._host.tick = robot.tick
+        self._state.put(self._last)
+
+    def _keep_state(self, tick: int) -> None:
+        """Answer for `tick` with the state before it, as one that did not converge."""
+        if self._last is None:
+            return
+        report = msgspec.structs.replace(self._last.solver, converged=False)
+        self._last = msgspec.structs.replace(self._last, tick=tick, solver=report)
         self._state.put(self._last)
 
     def wake(self) -> float | None:

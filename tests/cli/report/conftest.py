@@ -261,7 +261,7 @@ def plan(tick: int, reason: str, names: tuple[str, ...]) -> Plan:
         actions=actions,
         target=BLOCK if actions else "",
         arm="psm1" if actions else "",
-        history={},
+        history=[],
         cost=[12],
         models=2,
         ground_s=0.0011,

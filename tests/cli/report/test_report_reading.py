@@ -126,10 +126,12 @@ def test_malformed_messages_are_counted_and_left_out(
 ) -> None:
     log = new_log()
     story.write_ticks(log, 0, 2)
+    trial = "t-7"
     log.raw("sa/verdict", b"\xc1 no msgpack")
     log.raw("robot/state", encode({"tick": "three", "seq": 99}))
-    flat = Array.of(np.zeros(4), "<f4")
-    log.put("sim/tissue_state", msgspec.structs.replace(story.tissue(3), nodes_m=flat))
+    flat = msgspec.msgpack.decode(encode(story.tissue(3))) | {"seq": 50, "trial": trial}
+    flat["nodes_m"] = msgspec.msgpack.decode(encode(Array.of(np.zeros(4), "<f4")))
+    log.raw("sim/tissue_state", encode(flat))
     log.file.close({})
     trial = read_trial(log.file.path)
     assert trial.malformed == 3

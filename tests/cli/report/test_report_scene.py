@@ -99,6 +99,7 @@ def test_of_two_faces_above_each_other_the_upper_carries(story: Any) -> None:
         nodes_m=Array.of(nodes, "<f8"),
         surface=Array.of(np.arange(6).reshape(2, 3), "<i4"),
     )
-    state = msgspec.structs.replace(story.tissue(0), nodes_m=Array.of(nodes, "<f4"))
+    nodes_m = Array.of(nodes, "<f4")
+    state = msgspec.structs.replace(story.tissue(0), nodes_m=nodes_m, nodal_force_n=nodes_m)
     places, _ = scene.carried(model, state, np.array([[0.25, 0.25, 0.0]]))
     np.testing.assert_allclose(places, [[0.25, 0.25, 1.0]])

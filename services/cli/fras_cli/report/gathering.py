@@ -158,8 +158,6 @@ class Gathering:
 
     def _on_model(self, model: TissueModel) -> None:
         surface, n_nodes = model.surface.ints(), len(model.nodes_m.view())
-        _expect(topics.TISSUE_MODEL.key, "nodes_m", model.nodes_m.shape, (n_nodes, 3))
-        _expect(topics.TISSUE_MODEL.key, "surface", surface.shape, (len(surface), 3))
         if surface.size and not 0 <= surface.min() <= surface.max() < n_nodes:
             problem = f"names a node outside 0..{n_nodes - 1}"
             raise MalformedMessage(topics.TISSUE_MODEL.key, "$.surface", problem)
@@ -181,9 +179,9 @@ class Gathering:
         )
 
     def _on_tissue(self, state: TissueState) -> None:
-        key, n_nodes = topics.TISSUE_STATE.key, state.nodes_m.shape[0]
-        _expect(key, "nodes_m", state.nodes_m.shape, (n_nodes, 3))
-        _expect(key, "nodal_force_n", state.nodal_force_n.shape, (n_nodes, 3))
+        if state.nodal_force_n.shape != state.nodes_m.shape:
+            problem = f"{state.nodal_force_n.shape[0]} for {state.nodes_m.shape[0]} nodes"
+            raise MalformedMessage(topics.TISSUE_STATE.key, "$.nodal_force_n", problem)
         top_m = float(state.nodes_m.floats()[:, 2].max(initial=-math.inf))
         views = self._views or TissueViews(first=state, highest=state, last=state)
         if top_m > self._top_m:
@@ -211,8 +209,3 @@ class Gathering:
 
 def _by_tick(entries: Mapping[int, T]) -> tuple[T, ...]:
     return tuple(entries[tick] for tick in sorted(entries))
-
-
-def _expect(key: str, name: str, shape: tuple[int, ...], expected: tuple[int, ...]) -> None:
-    if shape != expected:
-        raise MalformedMessage(key, f"$.{name}", f"shape {shape} instead of {expected}")

@@ -3,6 +3,7 @@
 from fras_common.scenario.generator import draw_scene, resolve
 from fras_common.scenario.geometry import attachment_raster, nodes_in_discs
 from fras_common.scenario.loader import ScenarioError, check, load, to_toml
+from fras_common.scenario.mesh import MeshFacts, fit_to_mesh
 from fras_common.scenario.model import (
     AwarenessSection,
     Disc,
@@ -19,6 +20,7 @@ __all__ = [
     "AwarenessSection",
     "Disc",
     "GeneratorSection",
+    "MeshFacts",
     "MotionSection",
     "PlannerSection",
     "RunSection",
@@ -29,6 +31,7 @@ __all__ = [
     "attachment_raster",
     "check",
     "draw_scene",
+    "fit_to_mesh",
     "load",
     "nodes_in_discs",
     "resolve",

@@ -60,42 +60,32 @@ def convert(raw: Mapping[str, Any], file: str) -> Scenario:
 def check(scenario: Scenario, file: str = "scenario") -> Scenario:
     """Check what one field alone can't tell, and return the scenario.
 
+    What lies where on the tissue is checked for a box only; for a mesh file `fit_to_mesh` does it,
+    once the size is known.
+
     Raises
     ------
     ScenarioError
         ROI outside the tissue, a disc off the tissue, inverted ranges, hard below soft limit, no
-        room for the ROI that the generator is to draw.
+        room for the ROI that the generator is to draw, an element that the box has not.
     """
-    size, scene, awareness = scenario.tissue.size_m, scenario.scene, scenario.awareness
-    if scene is not None:
-        for axis, name in enumerate("xy"):
-            if not 0 <= scene.roi_m[axis] <= size[axis]:
-                raise ScenarioError(
-                    file, "scene.roi_m", list(scene.roi_m),
-                    f"{name} must lie on the tissue, between 0 and {size[axis]} m",
-                )  # fmt: skip
-        if not -0.01 < scene.roi_m[2] <= 0:
+    tissue, generator, awareness = scenario.tissue, scenario.generator, scenario.awareness
+    if tissue.mesh_file is None:
+        check_places(scenario, file)
+        if tissue.element not in {"hex8-sri", "hex8"}:
             raise ScenarioError(
-                file, "scene.roi_m", list(scene.roi_m),
-                "z must lie under the tissue, above -0.01 m and at most 0",
+                file, "tissue.element", tissue.element,
+                "the box consists of hexahedra: hex8-sri or hex8, or give a mesh_file",
             )  # fmt: skip
-        for index, disc in enumerate(scene.discs):
-            if not (0 <= disc.center_m[0] <= size[0] and 0 <= disc.center_m[1] <= size[1]):
-                raise ScenarioError(
-                    file, f"scene.discs[{index}].center_m", list(disc.center_m),
-                    f"must lie on the tissue: x up to {size[0]} m, y up to {size[1]} m",
-                )  # fmt: skip
-    generator = scenario.generator
+        if tissue.mesh_scale != 1.0:
+            raise ScenarioError(
+                file, "tissue.mesh_scale", tissue.mesh_scale,
+                "scales a mesh_file, and there is none: leave it out",
+            )  # fmt: skip
     if generator.disc_radius_max_m < generator.disc_radius_min_m:
         raise ScenarioError(
             file, "generator.disc_radius_max_m", generator.disc_radius_max_m,
             f"must be at least disc_radius_min_m = {generator.disc_radius_min_m}",
-        )  # fmt: skip
-    half = min(size[0], size[1]) / 2
-    if scene is None and generator.roi_edge_margin_m >= half:
-        raise ScenarioError(
-            file, "generator.roi_edge_margin_m", generator.roi_edge_margin_m,
-            f"must be below {half}, half the tissue's shorter side",
         )  # fmt: skip
     if awareness.hard_limit_n is not None and awareness.hard_limit_n < awareness.force_limit_n:
         raise ScenarioError(
@@ -114,6 +104,40 @@ def check(scenario: Scenario, file: str = "scenario") -> Scenario:
                 "motion.stop_deceleration_m_s2",
             )  # fmt: skip
     return scenario
+
+
+def check_places(scenario: Scenario, file: str) -> None:
+    """Check that ROI and discs lie on the tissue, and that it has room for a ROI to be drawn.
+
+    Raises
+    ------
+    ScenarioError
+    """
+    size, scene, generator = scenario.tissue.size_m, scenario.scene, scenario.generator
+    if scene is not None:
+        for axis, name in enumerate("xy"):
+            if not 0 <= scene.roi_m[axis] <= size[axis]:
+                raise ScenarioError(
+                    file, "scene.roi_m", list(scene.roi_m),
+                    f"{name} must lie on the tissue, between 0 and {size[axis]} m",
+                )  # fmt: skip
+        if not -0.01 < scene.roi_m[2] <= 0:
+            raise ScenarioError(
+                file, "scene.roi_m", list(scene.roi_m),
+                "z must lie under the tissue, above -0.01 m and at most 0",
+            )  # fmt: skip
+        for index, disc in enumerate(scene.discs):
+            if not (0 <= disc.center_m[0] <= size[0] and 0 <= disc.center_m[1] <= size[1]):
+                raise ScenarioError(
+                    file, f"scene.discs[{index}].center_m", list(disc.center_m),
+                    f"must lie on the tissue: x up to {size[0]} m, y up to {size[1]} m",
+                )  # fmt: skip
+    half = min(size[0], size[1]) / 2
+    if scene is None and generator.roi_edge_margin_m >= half:
+        raise ScenarioError(
+            file, "generator.roi_edge_margin_m", generator.roi_edge_margin_m,
+            f"must be below {half}, half the tissue's shorter side",
+        )  # fmt: skip
 
 
 def to_toml(scenario: Scenario) -> str:

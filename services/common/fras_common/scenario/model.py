@@ -27,15 +27,29 @@ class TissueSection(Section, frozen=True, kw_only=True):
     Attributes
     ----------
     size_m : (3,)
-        Extents along x, y, z; the box starts at the origin.
+        Extents along x, y, z; the box starts at the origin. With a mesh file that is its bounding
+        box, filled in when the file is read.
     node_counts : (3,)
-        Nodes along x, y, z.
+        Nodes of the box along x, y, z.
+    mesh_file : str or None
+        A volume mesh to use instead of the box; relative to the scenario's file. Services never
+        open it: its bytes travel beside the scenario, the name tells their format.
+    mesh_scale : float
+        What makes metres of the numbers in the mesh file.
+    element : {"hex8-sri", "hex8", "tet4", "tet10"}
+        Finite element; must be one for the cells of the mesh.
+    material : {"svk", "neo-hookean"}
+        St Venant-Kirchhoff or compressible neo-Hookean.
     gravity, bed : bool
         Weight, and the unilateral bed under the tissue.
     """
 
     size_m: tuple[Length, Length, Length] = (0.1, 0.12, 0.005)
     node_counts: tuple[NodeCount, NodeCount, NodeCount] = (21, 25, 2)
+    mesh_file: str | None = None
+    mesh_scale: Annotated[float, Meta(gt=0, le=1e6)] = 1.0
+    element: Literal["hex8-sri", "hex8", "tet4", "tet10"] = "hex8-sri"
+    material: Literal["svk", "neo-hookean"] = "svk"
     young_modulus_pa: Annotated[float, Meta(gt=0, le=1e9)] = 3000.0
     poisson_ratio: Annotated[float, Meta(ge=0, lt=0.5)] = 0.45
     density_kg_m3: Annotated[float, Meta(gt=0, le=1e5)] = 950.0

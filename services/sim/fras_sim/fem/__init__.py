@@ -5,26 +5,45 @@ tissue = TissueSimulator(mesh, TissueParameters(), fixed_nodes)
 result = tissue.step({"psm1": ToolInput(tip_m, jaw_rad)})
 """
 
-from fras_sim.fem.errors import BadMesh, BadParameter, BadToolInput, FactorizationFailed, FemError
+from fras_sim.fem.cells import Cell
+from fras_sim.fem.checkpoint import Checkpoint
+from fras_sim.fem.errors import (
+    BadMesh,
+    BadParameter,
+    BadToolInput,
+    FactorizationFailed,
+    FemError,
+    NotConverged,
+)
 from fras_sim.fem.grasp import ToolInput
-from fras_sim.fem.mesh import Mesh, box_mesh
+from fras_sim.fem.mesh import Mesh, box_mesh, make_mesh
 from fras_sim.fem.parameters import SolverOptions, TissueParameters
 from fras_sim.fem.simulator import SolverReport, StepResult, TissueSimulator
+from fras_sim.fem.statics import StaticResult, solve_static
+from fras_sim.fem.tetrahedra import split_into_tetrahedra, with_midside_nodes
 from fras_sim.fem.warmup import compile_kernels
 
 __all__ = [
     "BadMesh",
     "BadParameter",
     "BadToolInput",
+    "Cell",
+    "Checkpoint",
     "FactorizationFailed",
     "FemError",
     "Mesh",
+    "NotConverged",
     "SolverOptions",
     "SolverReport",
+    "StaticResult",
     "StepResult",
     "TissueParameters",
     "TissueSimulator",
     "ToolInput",
     "box_mesh",
     "compile_kernels",
+    "make_mesh",
+    "solve_static",
+    "split_into_tetrahedra",
+    "with_midside_nodes",
 ]

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fras_sim.fem import kernels
 from fras_sim.fem.element import ElementKind, quadrature
-from fras_sim.fem.material import lame_parameters
+from fras_sim.fem.element_kernels import element_kernels
+from fras_sim.fem.materials import MaterialName, lame_parameters
 from fras_sim.fem.mesh import Mesh
 
 FIXED = -1
@@ -27,8 +27,8 @@ class SparsityPattern:
         For each row, its place in a flattened (n_nodes, 3) array.
     row_of : ndarray, shape (n_nodes, 3), int32
         For each degree of freedom, its row, or -1 if its node is fixed.
-    scatter : ndarray, shape (n_elements, 36, 9), int32
-        Target of each entry of `kernels.hessian`; what belongs nowhere goes to ``n_entries``.
+    scatter : ndarray, shape (n_elements, n_pairs, 9), int32
+        Target of each entry of an element's Hessian; what belongs nowhere goes to ``n_entries``.
     """
 
     indptr: NDArray[np.int32]
@@ -65,7 +65,7 @@ def sparsity_pattern(
     row_of = np.full((n_nodes, 3), FIXED, dtype=np.int32)
     row_of[is_free] = np.arange(n, dtype=np.int32)
 
-    first, second = np.triu_indices(kernels.N_A)
+    first, second = np.triu_indices(elements.shape[1])
     rows_a = np.repeat(row_of[elements[:, first]], 3, axis=2).astype(np.int64)
     rows_b = np.tile(row_of[elements[:, second]], (1, 1, 3)).astype(np.int64)
     low, high = np.minimum(rows_a, rows_b), np.maximum(rows_a, rows_b)
@@ -103,17 +103,22 @@ class ElasticBody:
     ----------
     mesh : Mesh
     young_modulus_pa, poisson_ratio : float
-    kind : {"hex8-sri", "hex8"}
+    kind : {"hex8-sri", "hex8", "tet4", "tet10"}
     fixed_nodes : ndarray of int32
         Nodes that are eliminated from the Hessian.
+    material : {"svk", "neo-hookean"}
+
+    Raises
+    ------
+    BadParameter, BadMesh
+        See `lame_parameters`, `quadrature`, `materials.material_module`.
 
     Notes
     -----
     Viscosity is part of the same formula. With the ratio ``c = beta / h`` the incremental potential
-    of a Kelvin-Voigt solid, ``W(E) + (c / 2) (E - E_n) : C : (E - E_n)``, equals
-    ``(1 + c) W(E - c / (1 + c) E_n)`` up to a constant: a stiffer solid whose stress-free strain
-    lags behind. It dissipates, is blind to rigid rotation, and at rest is Rayleigh's ``beta K``
-    (Ortiz, Stainier, *Comput. Methods Appl. Mech. Eng.* 171, 1999, for the variational form).
+    of a Kelvin-Voigt solid is ``W(F) + (c / 2) (E - E_n) : C : (E - E_n)``, C the stiffness at
+    rest. It dissipates, is blind to rigid rotation, and at rest is Rayleigh's ``beta K`` (Ortiz,
+    Stainier, *Comput. Methods Appl. Mech. Eng.* 171, 1999, for the variational form).
     """
 
     def __init__(
@@ -123,6 +128,7 @@ class ElasticBody:
         poisson_ratio: float,
         kind: ElementKind,
         fixed_nodes: NDArray[np.int32],
+        material: MaterialName = "svk",
     ) -> None:
         points = quadrature(mesh, kind)
         lame_lambda, lame_mu = lame_parameters(young_modulus_pa, poisson_ratio)
@@ -130,11 +136,12 @@ class ElasticBody:
         self.nodal_volume_m3 = np.zeros(len(mesh.nodes_m))
         np.add.at(self.nodal_volume_m3, mesh.elements, points.nodal_volumes)
         self.pattern = sparsity_pattern(mesh.elements, len(mesh.nodes_m), fixed_nodes)
+        self.no_strain = np.zeros((*points.gradients.shape[:2], 6))
+        self._kernels = element_kernels(mesh.elements.shape[1], material)
         self._elements = np.ascontiguousarray(mesh.elements, dtype=np.int32)
         self._gradients = points.gradients
         self._bulk = lame_lambda * points.bulk_weights
         self._shear = lame_mu * points.shear_weights
-        self.no_strain = np.zeros((*points.gradients.shape[:2], 6))
 
     def energy_gradient(
         self,
@@ -145,11 +152,18 @@ class ElasticBody:
     ) -> float:
         """Add dW/dx [N] at the positions `x`, shape (n_nodes, 3), to `force`; return W [J].
 
-        With `ratio` c > 0 and the strain at the start of the step, viscosity is included.
+        With `ratio` c > 0 and the strain at the start of the step, viscosity is included. The
+        energy is infinite where the material cannot be; the gradient means nothing then.
         """
-        bulk, shear, origin = self._lagging(ratio, strain_before)
-        return kernels.energy_gradient(
-            x, self._elements, self._gradients, bulk, shear, origin, force
+        return self._kernels.energy_gradient(
+            x,
+            self._elements,
+            self._gradients,
+            self._bulk,
+            self._shear,
+            self.no_strain if strain_before is None else strain_before,
+            ratio,
+            force,
         )
 
     def hessian(
@@ -162,17 +176,17 @@ class ElasticBody:
     ) -> NDArray[np.float64]:
         """Return the entries of d²W/dx² in the pattern [N/m].
 
-        With `project` the matrix is positive semidefinite (`kernels.hessian`).
+        With `project` the matrix is positive semidefinite (`materials`).
         """
-        bulk, shear, origin = self._lagging(ratio, strain_before)
         values = np.zeros(self.pattern.n_entries + 1)
-        kernels.hessian(
+        self._kernels.hessian(
             x,
             self._elements,
             self._gradients,
-            bulk,
-            shear,
-            origin,
+            self._bulk,
+            self._shear,
+            self.no_strain if strain_before is None else strain_before,
+            ratio,
             project,
             self.pattern.scatter,
             values,
@@ -183,13 +197,5 @@ class ElasticBody:
         """Return the strain at each quadrature point and the ids of the inverted elements."""
         strain = np.empty_like(self.no_strain)
         inverted = np.empty(len(self._elements), dtype=np.int32)
-        count = kernels.strains(x, self._elements, self._gradients, strain, inverted)
+        count = self._kernels.strains(x, self._elements, self._gradients, strain, inverted)
         return strain, np.flatnonzero(inverted).astype(np.int32) if count else inverted[:0]
-
-    def _lagging(
-        self, ratio: float, strain_before: NDArray[np.float64] | None
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        if ratio == 0.0 or strain_before is None:
-            return self._bulk, self._shear, self.no_strain
-        stiffer = 1.0 + ratio
-        return stiffer * self._bulk, stiffer * self._shear, (ratio / stiffer) * strain_before

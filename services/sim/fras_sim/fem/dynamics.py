@@ -15,7 +15,8 @@ from fras_sim.fem.parameters import SolverOptions, TissueParameters
 
 STANDARD_GRAVITY_M_S2 = 9.80665
 ARMIJO = 1e-4
-MAX_HALVINGS = 12
+# Enough for a first step of a metre to become one that the bed bears.
+MAX_HALVINGS = 20
 # Two energies that differ by less than this share, or by less than this share of the work of the
 # tolerated force over the tolerated step, are the same number but for rounding.
 ENERGY_ROUNDING = 1e-13
@@ -55,7 +56,7 @@ class StepSolution:
 
 @dataclass(frozen=True, eq=False)
 class _Step:
-    """Where one step starts and where inertia and weight alone would take it."""
+    """Where one step starts and where inertia alone would take it."""
 
     before: Motion
     target: Array
@@ -76,14 +77,15 @@ class ImplicitEuler:
     -----
     With mass M (lumped), drag alpha and step h the new positions minimise ::
 
-        1/2 |x - y|²_D + W(x) + viscosity(x; E_n) + sum k/2 min(z, 0)²
-        D = M (1/h² + alpha/h),   y = x_n + (h v_n + h² g) / (1 + alpha h)
+        1/2 |x - y|²_D + W(x) + viscosity(x; E_n) + sum k/2 min(z, 0)² + sum m g z
+        D = M (1/h² + alpha/h),   y = x_n + h v_n / (1 + alpha h)
 
     whose gradient is the implicit Euler equation (Martin et al., *Example-based elastic
     materials*, 2011, section 4; Liu et al., *Quasi-Newton methods for real-time simulation of
     hyperelastic materials*, 2017, for L-BFGS on top of a factored Hessian). The factor is that of
     an earlier step's projected Hessian: L-BFGS makes up for what has changed since. The memory of
-    L-BFGS and the factor outlive a step; `forget` clears both.
+    L-BFGS and the factor outlive a step; `forget` clears both. In the quasi-static mode D and the
+    viscosity are zero: what remains is the equilibrium.
     """
 
     def __init__(
@@ -101,10 +103,11 @@ class ImplicitEuler:
         self._options = options
         self._dt_s = h
         self._drag = 1.0 + parameters.mass_damping_per_s * h
-        self._inertia = self.mass_kg * self._drag / h**2
-        self._fall = np.array([0.0, 0.0, -STANDARD_GRAVITY_M_S2 * h**2])
-        self._fall *= 1.0 if parameters.gravity else 0.0
-        self._ratio = parameters.stiffness_damping_s / h
+        moves_on = not parameters.quasi_static
+        self._moves_on = 1.0 if moves_on else 0.0
+        self._inertia = self._moves_on * self.mass_kg * self._drag / h**2
+        self._ratio = self._moves_on * parameters.stiffness_damping_s / h
+        self._weight = self.mass_kg * (STANDARD_GRAVITY_M_S2 if parameters.gravity else 0.0)
         self._bed = (
             bed_stiffness(body.mesh, parameters.bed_stiffness_pa_m)
             if parameters.bed
@@ -135,20 +138,21 @@ class ImplicitEuler:
         -----
         The first guess goes on at the old velocity; where the held nodes don't, the others take
         the linear answer to the difference. A matrix that can't be factored ends the step as not
-        converged.
+        converged, as does a material that no first guess keeps within its bounds.
         """
         self._hold(held)
-        problem = _Step(before, before.x + (self._dt_s * before.v + self._fall) / self._drag)
-        x = before.x + self._dt_s * before.v
-        lead = held_at_m - x[held]
+        problem = _Step(before, before.x + self._dt_s * before.v / self._drag)
         stale = self._factor_age is None or self._factor_age >= self._options.refactor_every
         try:
             if stale:
                 self._refactor(before.x, problem)
-            if np.abs(lead).max(initial=0.0) > LEAD_ROUNDING_M:
-                x = self._predict(x, problem, lead)
-            x[held] = held_at_m
-            solution = self._minimise(x, problem, refactored=stale)
+            coasting = before.x + self._moves_on * self._dt_s * before.v
+            x = self._start(coasting, problem, held, held_at_m)
+            energy, gradient = self._energy(x, problem)
+            if not np.isfinite(energy):
+                x = self._start(before.x, problem, held, held_at_m)
+                energy, gradient = self._energy(x, problem)
+            solution = self._minimise(x, energy, gradient, problem, refactored=stale)
         except FactorizationFailed:
             self.forget()
             _, gradient = self._energy(before.x, problem)
@@ -162,7 +166,21 @@ class ImplicitEuler:
         """Return elastic energy, that of the bed and that of the weight, the last from z = 0."""
         energy = self._body.energy_gradient(x, np.zeros_like(x))
         energy += 0.5 * float(self._bed @ np.minimum(x[:, 2], 0.0) ** 2)
-        return energy - float(self.mass_kg @ (x @ self._fall)) / self._dt_s**2
+        return energy + float(self._weight @ x[:, 2])
+
+    def imbalance_n(
+        self, before: Motion, solution: StepSolution, supported: NDArray[np.bool_]
+    ) -> float:
+        """Return the norm of the sum of all forces on the body [N].
+
+        Inertia, drag, bed and weight of all nodes, less what supports and tools exert. Elastic and
+        viscous forces are absent from the sum, which they leave as it is only if they balance
+        within the body: so this checks them too.
+        """
+        target = before.x + self._dt_s * before.v / self._drag
+        total = self._inertia @ (solution.x - target)
+        total[2] += self._bed @ np.minimum(solution.x[:, 2], 0.0) + self._weight.sum()
+        return float(np.linalg.norm(total - solution.gradient[supported].sum(axis=0)))
 
     def _hold(self, held: NDArray[np.int32]) -> None:
         rows = self._body.pattern.row_of[held].ravel()
@@ -173,7 +191,9 @@ class ImplicitEuler:
     def _energy(self, x: Array, problem: _Step) -> tuple[float, Array]:
         gradient = np.zeros_like(x)
         energy = self._body.energy_gradient(x, gradient, self._ratio, problem.before.strain)
-        energy += kernels.nodal_terms(x, problem.target, self._inertia, self._bed, gradient)
+        energy += kernels.nodal_terms(
+            x, problem.target, self._inertia, self._bed, self._weight, gradient
+        )
         return energy, gradient
 
     def _reduced(self, gradient: Array) -> Array:
@@ -196,6 +216,16 @@ class ImplicitEuler:
         self._memory.clear()
         self._factor_age = 0
 
+    def _start(self, x: Array, problem: _Step, held: NDArray[np.int32], held_at_m: Array) -> Array:
+        """Return the first guess: `x`, with the linear answer to what the held nodes do."""
+        lead = held_at_m - x[held]
+        if np.abs(lead).max(initial=0.0) > LEAD_ROUNDING_M:
+            x = self._predict(x, problem, lead)
+        else:
+            x = x.copy()
+        x[held] = held_at_m
+        return x
+
     def _predict(self, x: Array, problem: _Step, lead: Array) -> Array:
         """Lead the held nodes to where they must be, the others by the linear answer to it."""
         pattern = self._body.pattern
@@ -208,10 +238,13 @@ class ImplicitEuler:
         answer[self._held_rows] = lead.ravel()
         return x + self._expanded(answer, x)
 
-    def _minimise(self, x: Array, problem: _Step, *, refactored: bool) -> StepSolution:
+    def _minimise(
+        self, x: Array, energy: float, gradient: Array, problem: _Step, *, refactored: bool
+    ) -> StepSolution:
         options = self._options
-        energy, gradient = self._energy(x, problem)
         reduced = self._reduced(gradient)
+        if not np.isfinite(energy):
+            return StepSolution(x, gradient, 0, _largest(reduced), refactored, converged=False)
         iteration = 0
         converged = False
         exact = refactored

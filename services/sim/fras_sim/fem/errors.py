@@ -38,3 +38,11 @@ class FactorizationFailed(FemError):
 
     Attributes: ``row`` of the reduced system (fixed nodes eliminated).
     """
+
+
+class NotConverged(FemError):
+    """A static problem for which no equilibrium was found.
+
+    Attributes: ``load`` (share of the prescribed displacements that was reached), ``residual``
+    [N], ``iterations``.
+    """

@@ -1,56 +1,64 @@
-"""Hexahedral meshes: the tissue box, its faces, its surface."""
+"""Meshes: the body at rest, its surface, its bottom; the tissue box."""
 
 import math
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from fras_sim.fem.cells import TOPOLOGY, Cell
 from fras_sim.fem.errors import BadMesh
 
-# Local nodes of the six faces of a VTK_HEXAHEDRON, each wound so that its normal points outward.
-HEX8_FACES = np.array(
-    [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]
-)
-HEX8_EDGES = np.array(
-    [[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]]
-)
-# Nodes at the same height to this much belong to the same face.
-FACE_TOLERANCE_M = 1e-9
+# A face looks down if its outward normal is within 60 degrees of straight down.
+DOWNWARD = -0.5
 
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """A body of 8-node hexahedra at rest.
+    """A body at rest, made of elements of one kind; `make_mesh` finds the surface.
 
     Parameters
     ----------
     nodes_m : ndarray, shape (n_nodes, 3), float64 [m]
         Rest positions in the world frame. The order of the nodes decides the bandwidth of the
         stiffness matrix: number slice by slice along the body's longest side.
-    elements : ndarray, shape (n_elements, 8), int32
-        Node ids in the order of VTK_HEXAHEDRON.
+    elements : ndarray, shape (n_elements, nodes per element), int32
+        Node ids in the order of VTK: VTK_HEXAHEDRON, VTK_TETRA, VTK_QUADRATIC_TETRA.
     surface : ndarray, shape (n_triangles, 3), int32
         Triangles of the boundary, normals outward.
+    cell : {"hex8", "tet4", "tet10"}
 
     Raises
     ------
     BadMesh
-        If there is no element, an id is out of range, a node belongs to no element or a
-        coordinate is not finite.
+        If there is no element, its number of nodes does not fit the cell, an id is out of range,
+        a node belongs to no element or a coordinate is not finite.
     """
 
     nodes_m: NDArray[np.float64]
     elements: NDArray[np.int32]
     surface: NDArray[np.int32]
+    cell: Cell = "hex8"
 
     def __post_init__(self) -> None:
         n_nodes = len(self.nodes_m)
+        if self.cell not in TOPOLOGY:
+            raise BadMesh(
+                f"cell = {self.cell!r} is not known: give one of {', '.join(TOPOLOGY)}",
+                cell=self.cell,
+            )
         if len(self.elements) == 0:
             raise BadMesh(
                 f"the mesh has {n_nodes} node(s) and no element: give at least 2x2x2 nodes",
                 n_nodes=n_nodes,
+            )
+        columns = TOPOLOGY[self.cell].n_nodes
+        if self.elements.shape[1:] != (columns,):
+            raise BadMesh(
+                f"elements have the shape {self.elements.shape}, "
+                f"{self.cell} needs {columns} nodes each",
+                cell=self.cell,
             )
         if not np.isfinite(self.nodes_m).all():
             bad = int(np.flatnonzero(~np.isfinite(self.nodes_m).all(axis=1))[0])
@@ -66,44 +74,81 @@ class Mesh:
 
     @cached_property
     def bottom_nodes(self) -> NDArray[np.int32]:
-        """Ids of the nodes of the lowest plane, ascending."""
-        height_m = self.nodes_m[:, 2]
-        return np.flatnonzero(height_m <= height_m.min() + FACE_TOLERANCE_M).astype(np.int32)
+        """Ids of the nodes of all boundary triangles that look down, ascending.
+
+        Of a box that is its lowest plane, of a curved slab its underside without the rim.
+        """
+        normal = self._surface_normals
+        length = np.linalg.norm(normal, axis=1)
+        return np.unique(self.surface[normal[:, 2] < DOWNWARD * length]).astype(np.int32)
 
     @cached_property
     def spacing_m(self) -> float:
-        """Length of the longest element edge: what "one node spacing" means for a grasp [m]."""
-        ends = self.nodes_m[self.elements[:, HEX8_EDGES]]
+        """Longest distance of neighbours in an element: "one node spacing" for a grasp [m]."""
+        ends = self.nodes_m[self.elements[:, TOPOLOGY[self.cell].edges]]
         return float(np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2).max())
 
     @cached_property
     def surface_area_m2(self) -> NDArray[np.float64]:
         """Share of the boundary's area that each node carries, shape (n_nodes,) [m²]."""
-        a, b, c = (self.nodes_m[self.surface[:, corner]] for corner in range(3))
-        third_m2 = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0
+        third_m2 = np.linalg.norm(self._surface_normals, axis=1) / 6.0
         area_m2 = np.zeros(len(self.nodes_m))
         np.add.at(area_m2, self.surface, third_m2[:, None])
         return area_m2
 
+    @cached_property
+    def _surface_normals(self) -> NDArray[np.float64]:
+        """Outward normals of the triangles, twice as long as their area is large."""
+        a, b, c = (self.nodes_m[self.surface[:, corner]] for corner in range(3))
+        return np.cross(b - a, c - a)
 
-def surface_triangles(elements: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Return the boundary of a hexahedral mesh as outward triangles.
+
+def make_mesh(nodes_m: ArrayLike, elements: ArrayLike, cell: Cell) -> Mesh:
+    """Return a mesh with its surface.
 
     Parameters
     ----------
-    elements : ndarray, shape (n_elements, 8), int32
+    nodes_m : array_like, shape (n_nodes, 3) [m]
+    elements : array_like of int, shape (n_elements, nodes per element)
+        In the order of VTK.
+    cell : {"hex8", "tet4", "tet10"}
+
+    Raises
+    ------
+    BadMesh
+        See `Mesh`.
+    """
+    nodes = np.ascontiguousarray(nodes_m, dtype=np.float64)
+    ids = np.ascontiguousarray(elements, dtype=np.int32)
+    if nodes.ndim != 2 or nodes.shape[1] != 3:
+        raise BadMesh(f"nodes_m has the shape {nodes.shape}: give (n_nodes, 3)", shape=nodes.shape)
+    fits = cell in TOPOLOGY and len(ids) > 0 and ids.shape[1:] == (TOPOLOGY[cell].n_nodes,)
+    # What does not fit is named by Mesh itself.
+    surface = surface_triangles(ids, cell) if fits else np.zeros((0, 3), dtype=np.int32)
+    return Mesh(nodes, ids, surface, cell)
+
+
+def surface_triangles(elements: NDArray[np.int32], cell: Cell = "hex8") -> NDArray[np.int32]:
+    """Return the boundary of a mesh as outward triangles.
+
+    Parameters
+    ----------
+    elements : ndarray, shape (n_elements, nodes per element), int32
+    cell : {"hex8", "tet4", "tet10"}
 
     Returns
     -------
     ndarray, shape (n_triangles, 3), int32
-        Two triangles for each face that only one element has.
+        For each face that only one element has: two triangles of a hex8, one of a tet4, four of a
+        tet10.
     """
-    faces = elements[:, HEX8_FACES].reshape(-1, 4)
+    topology = TOPOLOGY[cell]
+    faces = elements[:, topology.faces].reshape(-1, topology.faces.shape[1])
     _, first, count = np.unique(
         np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True
     )
     boundary = faces[np.sort(first[count == 1])]
-    return boundary[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3).astype(np.int32)
+    return boundary[:, topology.face_triangles].reshape(-1, 3).astype(np.int32)
 
 
 def box_mesh(

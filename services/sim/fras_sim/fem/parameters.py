@@ -3,9 +3,9 @@
 import math
 from dataclasses import dataclass
 
-from fras_sim.fem.element import ElementKind
+from fras_sim.fem.element import CELL_OF, ElementKind
 from fras_sim.fem.errors import BadParameter
-from fras_sim.fem.material import lame_parameters
+from fras_sim.fem.materials import MaterialName, lame_parameters, material_module
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,12 @@ class TissueParameters:
     bed_stiffness_pa_m : float
         Pressure of the bed for each metre of depth [Pa/m]. The default is that of 1 cm of the same
         tissue; a tenfold one doubles the iterations, as nodes touch down and lift off.
-    element : {"hex8-sri", "hex8"}
+    quasi_static : bool
+        Each step ends in the equilibrium for where the tools are: no inertia, no damping. Needs
+        three fixed nodes that are not on one line.
+    element : {"hex8-sri", "hex8", "tet4", "tet10"}
+        Has to fit the cells of the mesh.
+    material : {"svk", "neo-hookean"}
 
     Raises
     ------
@@ -45,10 +50,15 @@ class TissueParameters:
     gravity: bool = False
     bed: bool = True
     bed_stiffness_pa_m: float = 3e5
+    quasi_static: bool = False
     element: ElementKind = "hex8-sri"
+    material: MaterialName = "svk"
 
     def __post_init__(self) -> None:
         lame_parameters(self.young_modulus_pa, self.poisson_ratio)
+        material_module(self.material)
+        if self.element not in CELL_OF:
+            raise BadParameter("element", self.element, "one of " + ", ".join(CELL_OF))
         for name in ("density_kg_m3", "dt_s", "bed_stiffness_pa_m"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0.0):
@@ -79,6 +89,9 @@ class SolverOptions:
         Corrections in one step after which the factor is renewed, and L-BFGS with it.
     slow_iterations : int
         A step that needed this many corrections has the next one start with a fresh factor.
+    checkpoint_every : int
+        Ticks after which factor and memory are dropped in every run, so that a replay from a
+        checkpoint taken there gives the same bits.
     """
 
     step_tolerance_m: float = 3e-6
@@ -88,13 +101,15 @@ class SolverOptions:
     refactor_every: int = 10
     refactor_within: int = 10
     slow_iterations: int = 6
+    checkpoint_every: int = 10
 
     def __post_init__(self) -> None:
         for name in ("step_tolerance_m", "residual_tolerance_n"):
             value = getattr(self, name)
             if not value > 0.0:
                 raise BadParameter(name, value, "a positive number")
-        for name in ("history", "max_iterations", "refactor_every", "refactor_within"):
+        counts = ("history", "max_iterations", "refactor_every", "refactor_within")
+        for name in (*counts, "checkpoint_every"):
             value = getattr(self, name)
             if value < 1:
                 raise BadParameter(name, value, "1 or more")

@@ -1,12 +1,13 @@
 """The tissue as the service sees it: one call, one time step."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fras_sim.fem.assembly import ElasticBody
+from fras_sim.fem.checkpoint import Checkpoint
 from fras_sim.fem.dynamics import ImplicitEuler, Motion
 from fras_sim.fem.errors import BadParameter
 from fras_sim.fem.grasp import ArmState, ToolInput, move_arms
@@ -14,6 +15,7 @@ from fras_sim.fem.healing import heal
 from fras_sim.fem.linear_solver import linear_solver
 from fras_sim.fem.mesh import Mesh
 from fras_sim.fem.parameters import SolverOptions, TissueParameters
+from fras_sim.fem.supports import checked_fixed, fixed_patches
 
 Array = NDArray[np.float64]
 
@@ -47,6 +49,13 @@ class StepResult:
     max_node_speed_m_s : float
     tool_force_n : dict of ndarray, shape (3,) [N]
         Force that each known arm exerts on the tissue, the sum over its nodes.
+    fixed_force_n : ndarray, shape (3,) [N]
+        Force that all fixed nodes together exert on the tissue.
+    patch_force_n : ndarray, shape (n_patches, 3) [N]
+        The same for each patch of fixed nodes (`TissueSimulator.patches`).
+    balance_residual_n : float
+        Norm of the sum of all forces on the body in the last step: inertia, damping, elasticity,
+        bed, weight, supports and tools. Zero to the tolerance of the solver [N].
     grasped : dict of ndarray of int32
         Nodes that each known arm leads.
     solver : SolverReport
@@ -57,6 +66,9 @@ class StepResult:
     max_force_n: float
     max_node_speed_m_s: float
     tool_force_n: dict[str, Array]
+    fixed_force_n: Array
+    patch_force_n: Array
+    balance_residual_n: float
     grasped: dict[str, NDArray[np.int32]]
     solver: SolverReport
 
@@ -69,8 +81,11 @@ class TissueState:
     ``settling`` says that a release was the last thing the tools did.
     """
 
+    tick: int
+
     motion: Motion
     support_n: Array
+    balance_residual_n: float
     arms: dict[str, ArmState]
     settling: bool
 
@@ -117,7 +132,7 @@ class TissueSimulator:
     ) -> None:
         self.mesh = mesh
         self.parameters = parameters
-        self.fixed_nodes = _checked_fixed(fixed_nodes, len(mesh.nodes_m), bed=parameters.bed)
+        self.fixed_nodes = checked_fixed(mesh, fixed_nodes, parameters)
         self._is_fixed = np.zeros(len(mesh.nodes_m), dtype=bool)
         self._is_fixed[self.fixed_nodes] = True
         self._body = ElasticBody(
@@ -126,11 +141,12 @@ class TissueSimulator:
             parameters.poisson_ratio,
             parameters.element,
             self.fixed_nodes,
+            parameters.material,
         )
         self._solver = linear_solver(solver, self._body.pattern)
-        self._stepper = ImplicitEuler(
-            self._body, parameters, self._solver, options or SolverOptions()
-        )
+        self._options = options or SolverOptions()
+        self._stepper = ImplicitEuler(self._body, parameters, self._solver, self._options)
+        self.patches = fixed_patches(mesh, self.fixed_nodes)
         self._state = self._rest()
 
     @property
@@ -159,7 +175,7 @@ class TissueSimulator:
         )
         arms = {**seen, **self._state.arms}
         state = self._state
-        self._state = TissueState(state.motion, state.support_n, arms, state.settling)
+        self._state = replace(state, arms=arms)
         inverted = len(self._body.strain(state.motion.x)[1])
         return self._result(SolverReport(0, 0.0, False, True, inverted))
 
@@ -193,12 +209,17 @@ class TissueSimulator:
         if solution.converged:
             velocity = (solution.x - motion.x) / self.parameters.dt_s
             strain, inverted = self._body.strain(solution.x)
-            self._state = TissueState(
-                Motion(solution.x, velocity, strain), solution.gradient, arms, settling
-            )
+            supported = self._is_fixed.copy()
+            supported[nodes] = True
+            imbalance_n = self._stepper.imbalance_n(motion, solution, supported)
+            after = Motion(solution.x, velocity, strain)
+            tick = state.tick + 1
+            self._state = TissueState(tick, after, solution.gradient, imbalance_n, arms, settling)
         else:
-            self._stepper.forget()
+            self._state = replace(state, tick=state.tick + 1)
             _, inverted = self._body.strain(state.motion.x)
+        if self.checkpoint_due or not solution.converged:
+            self._stepper.forget()
         return self._result(
             SolverReport(
                 solution.iterations,
@@ -207,6 +228,54 @@ class TissueSimulator:
                 solution.converged,
                 len(inverted),
             )
+        )
+
+    @property
+    def checkpoint_due(self) -> bool:
+        """Whether a replay from a checkpoint taken now gives the same bits."""
+        return self._state.tick % self._options.checkpoint_every == 0
+
+    def checkpoint(self) -> Checkpoint:
+        """Return everything that the next step starts from.
+
+        A simulator of the same mesh, parameters, fixed nodes, solver and options that restores it
+        and is given the same tools computes the same bits as this one, if the checkpoint was taken
+        when `checkpoint_due`: at such ticks, in every run, the factor and the memory of the solver
+        are dropped. Restored from other ticks it agrees to the solver's tolerance.
+        """
+        state = self._state
+        return Checkpoint(
+            state.tick,
+            _read_only(state.motion.x.copy()),
+            _read_only(state.motion.v.copy()),
+            _read_only(state.support_n.copy()),
+            state.balance_residual_n,
+            dict(state.arms),
+            state.settling,
+        )
+
+    def restore(self, checkpoint: Checkpoint) -> None:
+        """Go on from a checkpoint.
+
+        Raises
+        ------
+        BadParameter
+            If it belongs to another mesh.
+        """
+        arrays = (checkpoint.nodes_m, checkpoint.velocity_m_s, checkpoint.support_n)
+        if any(array.shape != self.mesh.nodes_m.shape for array in arrays):
+            raise BadParameter(
+                "checkpoint", checkpoint.nodes_m.shape, f"arrays {self.mesh.nodes_m.shape}"
+            )
+        x, v, support_n = (np.array(array, dtype=np.float64, order="C") for array in arrays)
+        self._stepper.forget()
+        self._state = TissueState(
+            checkpoint.tick,
+            Motion(x, v, self._body.strain(x)[0]),
+            support_n,
+            checkpoint.balance_residual_n,
+            dict(checkpoint.arms),
+            checkpoint.settling,
         )
 
     def mechanical_energy_j(self) -> float:
@@ -218,7 +287,7 @@ class TissueSimulator:
     def _rest(self) -> TissueState:
         x = self.mesh.nodes_m.copy()
         motion = Motion(x, np.zeros_like(x), np.zeros_like(self._body.no_strain))
-        return TissueState(motion, np.zeros_like(x), {}, settling=False)
+        return TissueState(0, motion, np.zeros_like(x), 0.0, {}, settling=False)
 
     def _healed(self, motion: Motion) -> Motion:
         x, moved = heal(self._body, self._solver, motion.x)
@@ -241,6 +310,11 @@ class TissueSimulator:
             tool_force_n={
                 arm: state.support_n[held.nodes].sum(axis=0) for arm, held in state.arms.items()
             },
+            fixed_force_n=state.support_n[self.fixed_nodes].sum(axis=0),
+            patch_force_n=np.array(
+                [state.support_n[patch].sum(axis=0) for patch in self.patches]
+            ).reshape(-1, 3),
+            balance_residual_n=state.balance_residual_n,
             grasped={arm: held.nodes.copy() for arm, held in state.arms.items()},
             solver=report,
         )
@@ -257,14 +331,3 @@ def _read_only(array: Array) -> Array:
     view = array.view()
     view.flags.writeable = False
     return view
-
-
-def _checked_fixed(fixed_nodes: ArrayLike, n_nodes: int, *, bed: bool) -> NDArray[np.int32]:
-    nodes = np.unique(np.asarray(fixed_nodes, dtype=np.int64))
-    if len(nodes) and (nodes[0] < 0 or nodes[-1] >= n_nodes):
-        raise BadParameter("fixed_nodes", int(nodes[-1]), f"node ids from 0 to {n_nodes - 1}")
-    if len(nodes) == n_nodes:
-        raise BadParameter("fixed_nodes", "all", "at least one node that can move")
-    if len(nodes) == 0 and not bed:
-        raise BadParameter("fixed_nodes", "none", "at least one fixed node, or bed = True")
-    return nodes.astype(np.int32)
