@@ -65,7 +65,7 @@ def test_an_empty_file_is_the_default_scenario(written: Any):
         ("[tissue]\nyoung_modulus_kpa = 3", "tissue.young_modulus_kpa", 3,
          "did you mean young_modulus_pa?"),
         ("[tissue]\ndt_s = 20", "tissue.dt_s", 20, "<= 0.1"),
-        ("[awareness]\nclosed_jaw_rad = 20", "awareness.closed_jaw_rad", 20, "< 1.4"),
+        ("[awareness]\nclosed_jaw_rad = 20", "awareness.closed_jaw_rad", 20, "< 1.047"),
         ("[awareness]\nclosed_jaw_deg = 20", "awareness.closed_jaw_deg", 20,
          "did you mean closed_jaw_rad?"),
         ("[motion]\nfree_speed_m_s = 50", "motion.free_speed_m_s", 50, "<= 0.5"),
@@ -210,3 +210,29 @@ def test_absent_values_are_left_out_of_the_file():
     assert "scene" not in text
     assert "hard_limit_n" not in text
     assert "[tissue]" in text
+
+
+@pytest.mark.parametrize(
+    ("raw", "key"),
+    [
+        ({"tissue": {"node_counts": [200, 200, 200]}}, "tissue.node_counts"),
+        ({"tissue": {"size_m": [0.5, 0.12, 0.005]}}, "tissue.size_m[0]"),
+        ({"tissue": {"bed": False}, "generator": {"attached_fraction": 0.0}}, "tissue.bed"),
+        ({"motion": {"free_speed_m_s": 0.2}}, "motion.free_speed_m_s"),
+        ({"motion": {"jaw_speed_rad_s": 3.0}}, "motion.jaw_speed_rad_s"),
+        ({"motion": {"retreat_max_m": 0.0}}, "motion.retreat_max_m"),
+        (
+            {"awareness": {"visible_distance_m": 0.004}, "generator": {"roi_depth_m": 0.005}},
+            "awareness.visible_distance_m",
+        ),
+        ({"awareness": {"visible_fraction": 1.0}}, "awareness.visible_fraction"),
+        ({"awareness": {"closed_jaw_rad": 1.2}}, "awareness.closed_jaw_rad"),
+    ],
+)
+def test_what_a_service_would_refuse_is_told_before_any_starts(
+    raw: dict[str, Any], key: str
+) -> None:
+    with pytest.raises(ScenarioError) as caught:
+        convert(raw, "own.toml")
+    assert caught.value.values["key"] == key
+    assert "own.toml" in str(caught.value)

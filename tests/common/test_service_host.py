@@ -310,7 +310,9 @@ def test_a_query_that_meets_our_own_mistake_is_answered_all_the_same(bench: Any,
     assert isinstance(error, RemoteFault)
     assert error.remote_kind == "InternalFault"
     assert (logs[0]["log_level"], logs[0]["exc_info"]) == ("error", True)
-    assert mirrored[0].fault.kind == "InternalFault"
+    fault = mirrored[0].fault
+    assert fault is not None
+    assert fault.kind == "InternalFault"
 
 
 @pytest.mark.parametrize(("error", "ends"), [(FrasError("no"), False), (ZeroDivisionError(), True)])

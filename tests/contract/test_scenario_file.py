@@ -22,7 +22,7 @@ def made_possible(scenario: Scenario) -> Scenario:
     """The same scenario with its fields brought into agreement."""
     replace = msgspec.structs.replace
     generator, awareness, scene = scenario.generator, scenario.awareness, scenario.scene
-    x, y, z = (max(0.001, extent) for extent in scenario.tissue.size_m)
+    x, y, z = (min(0.11, max(0.001, extent)) for extent in scenario.tissue.size_m)
     tissue = replace(scenario.tissue, size_m=(x, y, z))
     if tissue.mesh_file is None:
         box = "hex8" if tissue.element == "hex8" else "hex8-sri"
@@ -48,8 +48,16 @@ def made_possible(scenario: Scenario) -> Scenario:
         awareness = replace(awareness, force_limit_n=limits[0], hard_limit_n=limits[1])
     motion, deceleration = scenario.motion, max(0.1, scenario.motion.stop_deceleration_m_s2)
     fastest = 2 * deceleration * scenario.tissue.dt_s
+    depth_m = -scene.roi_m[2] if scene is not None else generator.roi_depth_m
+    awareness = replace(
+        awareness, visible_distance_m=max(awareness.visible_distance_m, 1.01 * depth_m)
+    )
+    tissue = replace(
+        tissue, bed=True, node_counts=tuple(min(count, 40) for count in tissue.node_counts)
+    )
     motion = replace(
         motion,
+        jaw_speed_rad_s=min(motion.jaw_speed_rad_s, 100 * tissue.dt_s),
         stop_deceleration_m_s2=deceleration,
         free_speed_m_s=min(motion.free_speed_m_s, fastest),
         holding_speed_m_s=min(motion.holding_speed_m_s, fastest),

@@ -131,6 +131,16 @@ def test_a_copy_is_not_written_twice(path: Path, opened: Opened):
     assert (file.messages, file.lost) == (4, 0)
 
 
+def test_a_forged_number_leaves_nothing_out(path: Path, opened: Opened):
+    """Only a copy, number and stamp, is left out; a gap is told, what follows is recorded."""
+    file = opened()
+    for seq, stamp in ((0, 10), (2**32 - 1, 11), (1, 12), (2, 13), (1, 12)):
+        file.write(log_sample(seq, stamp=stamp), 1)
+    file.close({})
+    assert [message.sequence for _, _, message in read(path)] == [0, 2**32 - 1, 1, 2]
+    assert file.lost == 2**32 - 2
+
+
 @pytest.mark.parametrize(
     "payload",
     [

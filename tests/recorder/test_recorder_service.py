@@ -169,6 +169,18 @@ def test_a_second_open_supersedes_the_first(stage: Stage, tmp_path: Path):
     assert recorded(tmp_path / "2" / "audit.mcap")["robot/state"] == [1]
 
 
+def test_an_open_that_fails_does_not_cost_the_log_that_is_open(stage: Stage, tmp_path: Path):
+    stage.open(tmp_path / "1")
+    stage.tick(0)
+    (tmp_path / "file").write_text("in the way", encoding="utf-8")
+    with pytest.raises(RemoteFault, match="cannot write"):
+        stage.open(tmp_path / "file", trial="t-2")
+    stage.tick(1)
+    status = stage.task()
+    stage.ask_close(1, status.seq).wait()
+    assert recorded(tmp_path / "1" / "audit.mcap")["robot/state"] == [0, 1]
+
+
 def test_an_open_that_supersedes_answers_the_close_that_waited(stage: Stage, tmp_path: Path):
     stage.open(tmp_path / "1")
     closing = stage.ask_close(50, 50)

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -66,6 +67,20 @@ def tissue(tick: int, force_n: float = 0.0, converged: bool = True, **header: An
     )
 
 
+MODEL = TissueModel(
+    tick=0,
+    nodes_m=Array.of(CORNERS, "<f8"),
+    elements=Array.of(np.arange(8)[None], "<i4"),
+    surface=Array.of(FACES, "<i4"),
+    fixed_nodes=Array.of(np.zeros(0), "<i4"),
+    fixed_points_m=Array.of(np.zeros((0, 3)), "<f8"),
+    roi_m=(0.05, 0.06, 0.0),
+    young_modulus_pa=3000.0,
+    poisson_ratio=0.45,
+    dt_s=0.02,
+)
+
+
 class Bench(ShellBench):
     """Situation awareness, and a client that plays sim and motion."""
 
@@ -79,21 +94,7 @@ class Bench(ShellBench):
     def reset(self, trial: str = "t") -> None:
         scene = SceneSection(roi_m=(0.05, 0.06, 0.0))
         self.ask(SA_RESET, ResetRequest(trial=trial, scenario=Scenario(scene=scene)))
-        self.model.put(
-            TissueModel(
-                trial=trial,
-                tick=0,
-                nodes_m=Array.of(CORNERS, "<f8"),
-                elements=Array.of(np.arange(8)[None], "<i4"),
-                surface=Array.of(FACES, "<i4"),
-                fixed_nodes=Array.of(np.zeros(0), "<i4"),
-                fixed_points_m=Array.of(np.zeros((0, 3)), "<f8"),
-                roi_m=(0.05, 0.06, 0.0),
-                young_modulus_pa=3000.0,
-                poisson_ratio=0.45,
-                dt_s=0.02,
-            )
-        )
+        self.model.put(msgspec.structs.replace(MODEL, trial=trial))
         self.settle()
 
     def tick(self, number: int, **options: Any) -> None:
@@ -206,3 +207,23 @@ def test_targets(bench: Bench) -> None:
         SA_TARGET, TargetRequest(trial="t", action="reach", arm="psm1", block="b(9,9)")
     )
     assert unknown.remote_kind == "UnknownName"
+
+
+def test_scene_that_cannot_be_watched_is_answered_not_waited_for(bench: Bench) -> None:
+    far = SceneSection(roi_m=(0.05, 0.06, 0.0))
+    bench.ask(SA_RESET, ResetRequest(trial="t", scenario=Scenario(scene=far)))
+    waiting = bench.ask(SA_CONTEXT, ContextRequest(trial="t", request_id="c1", min_tick=0))
+    bench.model.put(msgspec.structs.replace(MODEL, roi_m=(0.9, 0.9, 0.9), trial="t"))
+    bench.settle()
+    later = bench.ask(SA_CONTEXT, ContextRequest(trial="t", request_id="c2", min_tick=0))
+    assert [answers[0].remote_kind for answers in (waiting, later)] == ["NoTissueNearRoi"] * 2
+    assert bench.host.counts["refused"] == 1
+
+
+def test_question_about_another_trial_is_refused(bench: Bench) -> None:
+    bench.reset()
+    bench.tick(0)
+    (context,) = bench.ask(SA_CONTEXT, ContextRequest(trial="old", request_id="c", min_tick=0))
+    asked = TargetRequest(trial="old", action="reach", arm="psm1", block="b(4,4)")
+    (target,) = bench.ask(SA_TARGET, asked)
+    assert context.remote_kind == target.remote_kind == "OtherTrial"

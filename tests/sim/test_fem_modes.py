@@ -82,8 +82,7 @@ def test_a_checkpoint_is_a_copy_and_belongs_to_its_mesh():
 def test_all_forces_balance_in_a_whole_trial(quasi_static, gravity):
     tissue = tissue_of(quasi_static=quasi_static, gravity=gravity)
     weight_n = 950.0 * 9.80665 * 0.1 * 0.12 * 0.005 * gravity
-    for tools in path_of(0.02, hold=2, released=20):
-        result = tissue.step(tools)
+    for result in [tissue.step(tools) for tools in path_of(0.02, hold=2, released=20)]:
         assert result.solver.converged
         largest = max(result.max_force_n, 1e-3)
         assert result.balance_residual_n < 0.02 * largest + 1e-4
@@ -95,6 +94,7 @@ def test_all_forces_balance_in_a_whole_trial(quasi_static, gravity):
         len(tissue.patches[1]),
     ]
     if gravity and quasi_static:
+        result = tissue.measure({})
         bed_n = 3e5 * tissue.mesh.surface_area_m2 @ np.maximum(-result.nodes_m[:, 2], 0.0)
         assert bed_n + result.fixed_force_n[2] == pytest.approx(weight_n, rel=1e-2)
 
@@ -111,11 +111,8 @@ def test_a_tight_solver_balances_to_rounding():
 def test_quasi_static_is_where_the_dynamics_come_to_rest():
     path = path_of(0.02)
     still, moving = tissue_of(quasi_static=True, bed=False), tissue_of(bed=False)
-    for tools in path:
-        at_once = still.step(tools)
-        moving.step(tools)
-    for _ in range(300):
-        slowly = moving.step(path[-1])
+    at_once = [still.step(tools) for tools in path][-1]
+    slowly = [moving.step(tools) for tools in [*path, *path[-1:] * 300]][-1]
     assert at_once.solver.converged
     np.testing.assert_allclose(at_once.nodes_m, slowly.nodes_m, atol=1e-4)
     assert at_once.max_force_n == pytest.approx(slowly.max_force_n, rel=1e-2)

@@ -1,6 +1,11 @@
+from typing import Any
+
 import pytest
 
 from fras_sim.stress import Tally, main, stress
+
+
+WORSE: list[dict[str, Any]] = [{"converged": 998}, {"finite": 999}, {"furthest_m": 2e-4}]
 
 
 def test_a_short_stress_run_breaks_nothing():
@@ -16,7 +21,7 @@ def test_the_command_prints_and_says_so(capsys: pytest.CaptureFixture[str]):
 
 
 def test_what_breaks_is_not_passed():
-    good = {"steps": 1000, "converged": 1000, "finite": 1000, "furthest_m": 1e-5}
+    good: dict[str, Any] = {"steps": 1000, "converged": 1000, "finite": 1000, "furthest_m": 1e-5}
     assert Tally(**good).passed
-    for worse in ({"converged": 998}, {"finite": 999}, {"furthest_m": 2e-4}):
+    for worse in WORSE:
         assert not Tally(**{**good, **worse}).passed

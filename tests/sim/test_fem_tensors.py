@@ -1,7 +1,9 @@
+from typing import cast
+
 import numpy as np
 import pytest
 
-from fras_sim.fem.tensors import determinant, inverse_transposed, positive_part
+from fras_sim.fem.tensors import Nine, determinant, inverse_transposed, positive_part
 
 A, B = np.empty((3, 3)), np.empty((3, 3))
 
@@ -55,7 +57,8 @@ def test_positive_part_of_random_matrices():
 
 def test_inverse_and_determinant():
     F = np.random.default_rng(5).standard_normal((3, 3))
-    J = determinant(tuple(F.ravel()))
+    nine = cast("Nine", tuple(F.ravel()))
+    J = determinant(nine)
     assert pytest.approx(np.linalg.det(F)) == J
-    inverse = np.reshape(inverse_transposed(tuple(F.ravel()), J), (3, 3))
+    inverse = np.reshape(inverse_transposed(nine, J), (3, 3))
     np.testing.assert_allclose(inverse, np.linalg.inv(F).T)

@@ -11,6 +11,7 @@ import msgspec
 import tomlkit
 
 from fras_common.errors import FrasError
+from fras_common.scenario.limits import breaches
 from fras_common.scenario.model import Scenario, Section
 
 _PATH = re.compile(r" - at `\$\.?(.*)`$")
@@ -66,10 +67,10 @@ def check(scenario: Scenario, file: str = "scenario") -> Scenario:
     Raises
     ------
     ScenarioError
-        ROI outside the tissue, a disc off the tissue, inverted ranges, hard below soft limit, no
-        room for the ROI that the generator is to draw, an element that the box has not.
+        ROI outside the tissue, a disc off the tissue, inverted ranges, no room for the ROI that the
+        generator is to draw, an element that the box has not, or a breach of `limits`.
     """
-    tissue, generator, awareness = scenario.tissue, scenario.generator, scenario.awareness
+    tissue, generator = scenario.tissue, scenario.generator
     if tissue.mesh_file is None:
         check_places(scenario, file)
         if tissue.element not in {"hex8-sri", "hex8"}:
@@ -87,22 +88,8 @@ def check(scenario: Scenario, file: str = "scenario") -> Scenario:
             file, "generator.disc_radius_max_m", generator.disc_radius_max_m,
             f"must be at least disc_radius_min_m = {generator.disc_radius_min_m}",
         )  # fmt: skip
-    if awareness.hard_limit_n is not None and awareness.hard_limit_n < awareness.force_limit_n:
-        raise ScenarioError(
-            file, "awareness.hard_limit_n", awareness.hard_limit_n,
-            f"must be at least force_limit_n = {awareness.force_limit_n}",
-        )  # fmt: skip
-    motion = scenario.motion
-    fastest = 2 * motion.stop_deceleration_m_s2 * scenario.tissue.dt_s
-    for name in ("free_speed_m_s", "holding_speed_m_s"):
-        speed: float = getattr(motion, name)
-        # The margin is for rounding: 2 * 1.25 * 0.02 is a little less than 0.05.
-        if speed > fastest * (1 + 1e-9):
-            raise ScenarioError(
-                file, f"motion.{name}", speed,
-                f"a stop must end within two ticks: at most {fastest:.4g}, or raise "
-                "motion.stop_deceleration_m_s2",
-            )  # fmt: skip
+    for key, value, allowed in breaches(scenario):
+        raise ScenarioError(file, key, value, allowed)
     return scenario
 
 

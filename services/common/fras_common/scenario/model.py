@@ -117,10 +117,10 @@ class AwarenessSection(Section, frozen=True, kw_only=True):
     hard_limit_n: Force | None = None
     no_limit: bool = False
     force_metric: Literal["nodal_max", "tool"] = "nodal_max"
-    visible_fraction: Fraction = 0.7
+    visible_fraction: Annotated[float, Meta(ge=0, lt=1)] = 0.7
     visible_distance_m: Length = 0.01
     at_distance_m: Length = 0.005
-    closed_jaw_rad: Annotated[float, Meta(gt=-0.7, lt=1.4)] = 0.3490658503988659
+    closed_jaw_rad: Annotated[float, Meta(gt=-0.349, lt=1.047)] = 0.3490658503988659
     blocks: Annotated[int, Meta(ge=1, le=40)] = 7
 
 
@@ -152,7 +152,7 @@ class MotionSection(Section, frozen=True, kw_only=True):
     jaw_speed_rad_s: Annotated[float, Meta(gt=0, le=18)] = 2.0
     lift_height_m: Annotated[float, Meta(gt=0, le=0.06)] = 0.05
     clearance_height_m: Annotated[float, Meta(gt=0, le=0.06)] = 0.03
-    retreat_max_m: Annotated[float, Meta(ge=0, le=0.02)] = 0.005
+    retreat_max_m: Annotated[float, Meta(gt=0, le=0.02)] = 0.005
     joint_time_constant_s: Annotated[float, Meta(ge=0, le=1)] = 0.01
 
 
