@@ -52,6 +52,7 @@ format: $(VENV)/.installed-dev ## format and mend what can be mended
 
 bench: $(VENV)/.installed-dev ## measure; figures belong into docs/benchmarks.md
 	$(BIN)/python -m benchmarks.loop
+	$(BIN)/python -m benchmarks.fe
 
 clean: ## remove what was built; runs/ stays
 	rm -rf $(VENV) build dist .pytest_cache .ruff_cache .import_linter_cache .hypothesis
