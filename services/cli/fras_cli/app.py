@@ -34,7 +34,7 @@ def _console(as_json: bool = False) -> Console:
 @app.command()
 def run(
     scenario: Annotated[
-        str, typer.Argument(help="A scenario file, or one that comes along: default, a, b, c.")
+        str, typer.Argument(help="A scenario file, or of ours: default, a, b, c, slab.")
     ] = "default",
     seed: Annotated[int | None, typer.Option(help="Draw the scene from this seed.")] = None,
     seeds: Annotated[

@@ -13,9 +13,9 @@ from fras_common.scenario import (
     nodes_in_discs,
 )
 from fras_common.scenario.mesh import SIZE_ROUNDING_M
-from fras_common.service.extras import require_extra
 from fras_sim.fem import Mesh, StepResult, TissueParameters, TissueSimulator, ToolInput, box_mesh
 from fras_sim.fem.underside import underside_height
+from fras_sim.mesh_file import mesh_facts, read_mesh
 
 
 class UnresolvedScenario(FrasError):
@@ -46,9 +46,6 @@ def build_mesh(scenario: Scenario, data: bytes) -> Mesh:
         )
     if tissue.mesh_file is None:
         return box_mesh(tissue.size_m, tissue.node_counts)
-    # Boxes need no meshio, and start-up need not wait for it.
-    with require_extra("sim"):
-        from fras_sim.mesh_file import mesh_facts, read_mesh
     mesh = read_mesh(data, tissue.mesh_file, tissue.mesh_scale)
     size_m = fit_to_mesh(scenario, mesh_facts(mesh)).tissue.size_m
     if not np.allclose(size_m, tissue.size_m, rtol=0.0, atol=SIZE_ROUNDING_M):

@@ -1,21 +1,22 @@
 """Patient geometry from the bytes of a mesh file; meshio knows the formats, we know tissue."""
 
-# meshio carries no types.
-# pyright: reportMissingTypeStubs=false, reportUnknownVariableType=false
-# pyright: reportUnknownMemberType=false, reportUnknownArgumentType=false
-
-import importlib
+import importlib.util
+import os
 import re
+import subprocess
+import sys
 import tempfile
+import zipfile
+from dataclasses import dataclass
 from pathlib import Path, PurePath
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fras_common.errors import FrasError
 from fras_common.scenario import MeshFacts
-from fras_common.service.extras import require_extra
+from fras_common.service.extras import MissingExtra
 from fras_sim.fem.cells import Cell
 from fras_sim.fem.element import CELL_OF
 from fras_sim.fem.mesh import Mesh, make_mesh
@@ -36,6 +37,7 @@ FORMATS: Final[dict[str, tuple[str, ...]]] = {
 CELLS: Final[dict[str, Cell]] = {"hexahedron": "hex8", "tetra": "tet4", "tetra10": "tet10"}
 # Abaqus's keyword that has a reader open further files. What came over the bus opens none.
 INCLUDE: Final = re.compile(rb"^\s*\*\s*include", re.IGNORECASE | re.MULTILINE)
+PARSE_TIMEOUT_S: Final = 20.0
 SURFACE_ONLY: Final = (".stl", ".obj", ".ply", ".off")
 
 
@@ -104,7 +106,23 @@ def mesh_facts(mesh: Mesh) -> MeshFacts:
     )
 
 
-def _parse(data: bytes, name: str) -> Any:
+@dataclass(frozen=True, eq=False)
+class _Block:
+    """Cells of one kind, `type` as meshio calls them."""
+
+    type: str
+    dim: int
+    data: NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class _Parsed:
+    points: NDArray[np.float64]
+    cells: list[_Block]
+
+
+def _parse(data: bytes, name: str) -> _Parsed:
+    file_name = PurePath(name).name
     suffix = PurePath(name).suffix.lower()
     if suffix not in FORMATS:
         why = "holds surfaces only" if suffix in SURFACE_ONLY else "is no format known here"
@@ -116,36 +134,74 @@ def _parse(data: bytes, name: str) -> Any:
         )
     if suffix == ".inp" and INCLUDE.search(data):
         raise UnreadableMesh(
-            f"{PurePath(name).name} includes other files: put the whole mesh into one", name=name
+            f"{file_name} includes other files: put the whole mesh into one", name=name
+        )
+    if importlib.util.find_spec("meshio") is None:
+        raise MissingExtra(
+            "sim needs the library 'meshio': install it with `pip install 'fras[sim]'`",
+            service="sim",
+            library="meshio",
         )
     problems: list[str] = []
-    # meshio reads most binary formats by file descriptor: a buffer in memory won't do.
     with tempfile.TemporaryDirectory(prefix="fras-mesh-") as folder:
-        path = Path(folder) / f"mesh{suffix}"
-        path.write_bytes(data)
+        source, target = Path(folder) / f"mesh{suffix}", Path(folder) / "parsed.npz"
+        source.write_bytes(data)
         for format_name in FORMATS[suffix]:
-            with require_extra("sim"):
-                reader = importlib.import_module(f"meshio.{format_name}")
-            try:
-                return reader.read(str(path))
-            except Exception as error:  # noqa: BLE001 - its parsers raise whatever they trip over
-                problems.append(f"as {format_name}: {type(error).__name__}: {error}")
-    detail = "; ".join(problems).replace(str(path), PurePath(name).name)
+            problem = _run_parser(format_name, source, target)
+            if not problem:
+                try:
+                    return _load(target)
+                except (OSError, ValueError, zipfile.BadZipFile) as error:
+                    problem = f"{type(error).__name__}: {error}"
+            problems.append(f"as {format_name}: {problem.replace(str(source), file_name)}")
     raise UnreadableMesh(
-        f"no mesh could be read from the {len(data)} bytes of {PurePath(name).name} ({detail}): "
-        "export it anew, or with another format",
+        f"no mesh could be read from the {len(data)} bytes of {file_name} "
+        f"({'; '.join(problems)}): export it anew, or with another format",
         name=name,
     )
 
 
-def _volume(parsed: Any) -> tuple[NDArray[np.float64], NDArray[np.int64], Cell]:
+def _run_parser(format_name: str, source: Path, target: Path) -> str:
+    """Run `mesh_parser`; return what went wrong, if anything."""
+    command = [sys.executable, "-m", "fras_sim.mesh_parser", format_name, str(source), str(target)]
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+    try:
+        done = subprocess.run(
+            command,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            timeout=PARSE_TIMEOUT_S,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        return f"not done within {PARSE_TIMEOUT_S:.0f} s"
+    if done.returncode == 0:
+        return ""
+    said = done.stderr.decode(errors="replace").strip().splitlines()
+    return said[-1] if done.returncode > 0 and said else "it takes too much time or memory to read"
+
+
+def _load(target: Path) -> _Parsed:
+    with np.load(target, allow_pickle=False) as arrays:
+        points = arrays["points"]
+        cells = [
+            _Block(kind, int(dim), arrays[key])
+            for key in arrays.files
+            if key != "points"
+            for _, dim, kind in [key.split(" ", 2)]
+        ]
+    return _Parsed(points, cells)
+
+
+def _volume(parsed: _Parsed) -> tuple[NDArray[np.float64], NDArray[np.int64], Cell]:
     """Pick the volume elements; number anew the nodes without those of faces, edges, points."""
-    points = np.array(parsed.points, dtype=np.float64)
+    points = parsed.points
     volumes = [block for block in parsed.cells if block.dim == 3]
     others = [block for block in parsed.cells if block.dim != 3]
     counts: dict[str, int] = {}
     for block in volumes:
-        counts[block.type] = counts.get(block.type, 0) + len(block)
+        counts[block.type] = counts.get(block.type, 0) + len(block.data)
     if not counts:
         found = ", ".join(sorted({block.type for block in others})) or "no"
         raise NoVolumeElements(
@@ -161,12 +217,12 @@ def _volume(parsed: Any) -> tuple[NDArray[np.float64], NDArray[np.int64], Cell]:
             counts=counts,
         )
     (kind,) = counts
-    elements = np.concatenate([np.asarray(block.data, dtype=np.int64) for block in volumes])
+    elements = np.concatenate([block.data for block in volumes])
     return *_without_loose(points, elements, others), CELLS[kind]
 
 
 def _without_loose(
-    points: NDArray[np.float64], elements: NDArray[np.int64], others: list[Any]
+    points: NDArray[np.float64], elements: NDArray[np.int64], others: list[_Block]
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Leave out nodes that only cells of lower dimension use; those of no cell stay, as faults."""
     used = np.zeros(len(points), dtype=np.bool_)
@@ -174,7 +230,7 @@ def _without_loose(
     used[inside] = True
     loose = np.zeros(len(points), dtype=np.bool_)
     for block in others:
-        ids = np.asarray(block.data, dtype=np.int64).ravel()
+        ids = block.data.ravel()
         loose[ids[(ids >= 0) & (ids < len(points))]] = True
     loose &= ~used
     if len(inside) < elements.size or not loose.any():
