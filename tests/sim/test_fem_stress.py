@@ -4,7 +4,6 @@ import pytest
 
 from fras_sim.stress import Tally, main, stress
 
-
 WORSE: list[dict[str, Any]] = [{"converged": 998}, {"finite": 999}, {"furthest_m": 2e-4}]
 
 

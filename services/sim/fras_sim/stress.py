@@ -3,7 +3,7 @@
 Grasps beside and on attachments, pulls 50 mm up and 60 mm sideways, lets go, grasps anew, with one
 arm and with both, at several times the speed of a careful surgeon; draws everything from a seed.
 Prints what share of the steps converged, whether every number stayed finite and how far from its
-rest the tissue ended after each release. Exit status 0 if nothing broke.
+rest the tissue ended after each release, and when. Exit status 0 if nothing broke.
 """
 
 import argparse
@@ -24,8 +24,10 @@ from fras_sim.fem import (
 
 LIFT_M, ASIDE_M = 0.05, 0.06
 OPEN_RAD, CLOSED_RAD = 1.0, -0.3
-# Ticks that the tissue is given to come back to rest after a release.
-SETTLING_TICKS = 150
+AT_REST_M = 1e-4
+# A large flap that hangs on one small attachment, without weight, creeps back over some 10 s: these
+# ticks (20 s) tell it from tissue that is caught somewhere.
+SETTLING_TICKS = 1000
 ARMS = ("psm1", "psm2")
 
 Vector = NDArray[np.float64]
@@ -41,13 +43,14 @@ class Tally:
     finite: int = 0
     episodes: int = 0
     furthest_m: float = 0.0
+    slowest_ticks: int = 0
     iterations: int = 0
 
     @property
     def passed(self) -> bool:
         """All finite, at least 99.9 % converged, less than 0.1 mm from rest after each release."""
         enough = self.converged >= 0.999 * self.steps
-        return self.finite == self.steps and enough and self.furthest_m < 1e-4
+        return self.finite == self.steps and enough and self.furthest_m < AT_REST_M
 
     def count(self, result: StepResult) -> None:
         """Take one more step into account."""
@@ -63,7 +66,8 @@ class Tally:
             f"{self.steps} steps in {self.episodes} episodes: converged {share:.3f} % "
             f"({self.steps - self.converged} not), finite {self.finite}/{self.steps}, "
             f"{self.iterations / max(self.steps, 1):.2f} corrections a step, "
-            f"at most {1e3 * self.furthest_m:.4f} mm from rest after a release"
+            f"at most {1e3 * self.furthest_m:.4f} mm from rest after a release, "
+            f"reached after at most {self.slowest_ticks} ticks"
         )
 
 
@@ -80,7 +84,7 @@ def make_tissue(node_counts: tuple[int, int, int], rng: np.random.Generator) -> 
 
 
 def episode(tissue: TissueSimulator, rng: np.random.Generator) -> Iterator[Tools]:
-    """Yield the tools of one episode: grasp, up, sideways, release, regrasp, release, wait."""
+    """Yield the tools of one episode: grasp, up, sideways, release, regrasp, release."""
     arms = ARMS if rng.random() < 0.4 else ARMS[:1]
     step_m = rng.uniform(0.0004, 0.0016)
     top_m = tissue.mesh.nodes_m[:, 2].max()
@@ -103,8 +107,7 @@ def episode(tissue: TissueSimulator, rng: np.random.Generator) -> Iterator[Tools
     yield all_at(OPEN_RAD)
     # The tissue is still on its way when it is grasped again, wherever the tools now are.
     yield from move(-aside, 0.02)
-    for _ in range(SETTLING_TICKS):
-        yield all_at(OPEN_RAD)
+    yield all_at(OPEN_RAD)
 
 
 def _grasp_point(tissue: TissueSimulator, rng: np.random.Generator, top_m: float) -> Vector:
@@ -131,14 +134,24 @@ def stress(steps: int, node_counts: tuple[int, int, int], seed: int) -> Tally:
     tally = Tally()
     while tally.steps < steps:
         tissue = make_tissue(node_counts, rng)
-        result = tissue.measure({})
+        tools: Tools = {}
+        result = tissue.measure(tools)
         for tools in episode(tissue, rng):
             result = tissue.step(tools)
             tally.count(result)
-        away_m = np.linalg.norm(result.nodes_m - tissue.mesh.nodes_m, axis=1).max()
-        tally.furthest_m = max(tally.furthest_m, float(away_m))
+        ticks = 0
+        while _away_m(tissue, result) >= AT_REST_M and ticks < SETTLING_TICKS:
+            result = tissue.step(tools)
+            tally.count(result)
+            ticks += 1
+        tally.furthest_m = max(tally.furthest_m, _away_m(tissue, result))
+        tally.slowest_ticks = max(tally.slowest_ticks, ticks)
         tally.episodes += 1
     return tally
+
+
+def _away_m(tissue: TissueSimulator, result: StepResult) -> float:
+    return float(np.linalg.norm(result.nodes_m - tissue.mesh.nodes_m, axis=1).max())
 
 
 def main(arguments: list[str] | None = None) -> int:

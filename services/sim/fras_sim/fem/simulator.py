@@ -147,7 +147,7 @@ class TissueSimulator:
         self._options = options or SolverOptions()
         self._stepper = ImplicitEuler(self._body, parameters, self._solver, self._options)
         self.patches = fixed_patches(mesh, self.fixed_nodes)
-        self._state = self._rest()
+        self._state: TissueState = self._rest()
 
     @property
     def solver_name(self) -> str:

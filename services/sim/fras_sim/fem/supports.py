@@ -1,5 +1,6 @@
 """Where a body is fixed: what is allowed, and its patches."""
 # pyright: reportUnknownVariableType=false, reportUnknownMemberType=false
+# pyright: reportUnknownArgumentType=false
 # Reason: scipy.sparse ships no types.
 
 import numpy as np
@@ -53,4 +54,4 @@ def fixed_patches(mesh: Mesh, fixed_nodes: NDArray[np.int32]) -> list[NDArray[np
     _, label = connected_components(graph, directed=False)
     labels = label[fixed_nodes]
     _, first = np.unique(labels, return_index=True)
-    return [fixed_nodes[labels == labels[k]] for k in np.sort(first)]
+    return [fixed_nodes[labels == labels[k]].astype(np.int32) for k in np.sort(first)]

@@ -100,10 +100,10 @@ def add_green_tangent(
     scratch: Floats,
 ) -> None:
     """Add dP/dF of P = F S(E), E any strain that differs from that of F by a constant."""
-    S = second_piola(E, lame_lambda, lame_mu)
+    stress = second_piola(E, lame_lambda, lame_mu)
     if project:
-        S = positive_part(S, scratch[0], scratch[1])
-    s00, s11, s22, s01, s12, s02 = S
+        stress = positive_part(stress, scratch[0], scratch[1])
+    s00, s11, s22, s01, s12, s02 = stress
     f = scratch[2]
     f[0, 0], f[0, 1], f[0, 2] = F[0], F[1], F[2]
     f[1, 0], f[1, 1], f[1, 2] = F[3], F[4], F[5]
