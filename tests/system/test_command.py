@@ -118,7 +118,16 @@ def test_bad_scenario_is_named_before_anything_starts(
 
 @pytest.mark.parametrize(
     "arguments",
-    [("--mesh", "21,25"), ("--seeds", "3"), ("--pace", "-1"), ("nowhere.toml",), ("nothing",)],
+    [
+        ("--mesh", "21,25"),
+        ("--seeds", "3"),
+        ("--seeds", "1..2", "--seed", "3"),
+        ("--pace", "-1"),
+        ("nowhere.toml",),
+        ("nothing",),
+        ("--cell", "a b"),
+        ("--connect", "localhost:7447"),
+    ],
 )
 def test_bad_option_is_named_before_anything_starts(
     fras: Fras, tmp_path: Path, arguments: tuple[str, ...]
@@ -127,6 +136,29 @@ def test_bad_option_is_named_before_anything_starts(
     assert command.end() == 2
     assert arguments[-1] in command.text
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    "arguments", [("run", "a", "--out", "file"), ("report", "file/audit.mcap", "--out", "file")]
+)
+def test_folder_that_can_not_be_written_is_one_line(
+    fras: Fras, tmp_path: Path, arguments: tuple[str, ...]
+) -> None:
+    (tmp_path / "file").write_text("in the way")
+    command = fras(*arguments)
+    assert command.end() in {1, 2}
+    assert "Traceback" not in command.text
+    assert "file" in command.text
+
+
+def test_closed_terminal_ends_the_trial_in_order(fras: Fras, tmp_path: Path) -> None:
+    command = fras("run", "a", "--out", "out")
+    command.until("reaching")
+    command.note_family()
+    command.process.send_signal(signal.SIGHUP)
+    assert command.end() == 130
+    assert command.alone()
+    assert summary_of(tmp_path / "out")["reason"] == "interrupted at the terminal"
 
 
 def test_taken_port_is_named(fras: Fras) -> None:

@@ -24,6 +24,26 @@ Cell = Annotated[str, typer.Option(help="Cell: stacks of different cells don't h
 Connect = Annotated[
     str | None, typer.Option(help="Endpoint of a router whose stack to use, tcp/HOST:PORT.")
 ]
+
+
+def _print_version(asked: bool) -> None:
+    if asked:
+        from importlib.metadata import version
+
+        print(f"fras {version('fras')}")
+        raise typer.Exit
+
+
+@app.callback()
+def common(
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version."),
+    ] = False,
+) -> None:
+    """Autonomous tissue retraction: plan, watch, move, explain, record."""
+
+
 SERVICE_ARGUMENTS = {"allow_extra_args": True, "ignore_unknown_options": True}
 
 
@@ -68,10 +88,10 @@ def run(
     ] = None,
 ) -> None:
     """Run a trial: the stack of `fras up` if there is one in the cell, else an own one."""
-    from fras_cli.options import build_trial, parse_seeds
+    from fras_cli.options import build_trial, choose_seeds
     from fras_cli.run import default_out, run_trials
 
-    chosen = list(parse_seeds(seeds)) if seeds is not None else [seed]
+    chosen = choose_seeds(seed, seeds)
     trials = [
         build_trial(
             scenario,
@@ -237,7 +257,7 @@ for _name, _help in {
 
 def main() -> None:
     """Run the command; a known error is one line and an exit status, not a traceback."""
-    from fras_cli.failures import exit_status
+    from fras_cli.failures import EXIT_BAD_INPUT, exit_status
     from fras_common.errors import FrasError
 
     try:
@@ -245,3 +265,6 @@ def main() -> None:
     except FrasError as error:
         print(f"fras: {error}", file=sys.stderr)
         sys.exit(exit_status(error))
+    except OSError as error:
+        print(f"fras: {error.filename or 'a file'}: {error.strerror or error}", file=sys.stderr)
+        sys.exit(EXIT_BAD_INPUT)

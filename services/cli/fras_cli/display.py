@@ -15,7 +15,7 @@ ACTION_WORDS = {
     "grasp": "grasping",
     "release": "releasing",
     "pull": "lifting",
-    "move": "moving sideways with",
+    "move": "moving the tissue sideways to",
 }
 PHASE_WORDS = {
     "resetting": "preparing the trial",
@@ -54,7 +54,7 @@ class LiveDisplay:
         if self._console.is_terminal:
             self._live.update(render(view))
             return
-        line = f"stopped by {view.holds}" if view.holds else action_line(view)
+        line = f"stopped by {view.holds} (`fras resume`)" if view.holds else action_line(view)
         if line != self._last_line:
             self._last_line = line
             self._console.print(line, highlight=False)

@@ -28,11 +28,10 @@ from fras_supervisor import (
     Unstoppable,
 )
 
+BAD_INPUT = (BadCell, BadEndpoint, FolderInUse, LogDirUnusable, ScenarioError)
 STACK_ERRORS = (
-    BadEndpoint,
     CommandNotFound,
     DownTimeout,
-    LogDirUnusable,
     MissingExtra,
     NoAnswer,
     NoRouter,
@@ -53,7 +52,7 @@ def exit_status(error: FrasError) -> int:
     """2 for bad input, 3 for a stack that fails, 130 if interrupted, 1 for the rest."""
     if isinstance(error, StartCancelled):
         return EXIT_INTERRUPTED
-    if isinstance(error, (ScenarioError, FolderInUse, BadCell)):
+    if isinstance(error, BAD_INPUT):
         return EXIT_BAD_INPUT
     if isinstance(error, STACK_ERRORS):
         return EXIT_STACK

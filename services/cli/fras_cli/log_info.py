@@ -61,5 +61,5 @@ def print_info(path: Path, console: Console) -> None:
     console.print(
         f"{summary.messages} messages, {summary.lost} lost, {summary.ticks} ticks, "
         f"{summary.sim_s:.1f} s simulated in {summary.wall_s:.1f} s, "
-        f"{'complete' if summary.complete else 'cut off: what was flushed is here'}"
+        f"{'file complete' if summary.complete else 'cut off: what was flushed is here'}"
     )

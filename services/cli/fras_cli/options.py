@@ -40,6 +40,21 @@ def shipped_scenarios() -> Path:
     return packaged if packaged.is_dir() else packaged.parents[4] / "compose" / "scenarios"
 
 
+def choose_seeds(seed: int | None, seeds: str | None) -> list[int | None]:
+    """Seeds to run, one after the other; None stands for the scenario's own.
+
+    Raises
+    ------
+    ScenarioError
+        If both are given, or `seeds` is no range.
+    """
+    if seeds is None:
+        return [seed]
+    if seed is not None:
+        raise ScenarioError(COMMAND_LINE, "--seed", seed, "not together with --seeds")
+    return list(parse_seeds(seeds))
+
+
 def parse_mesh(text: str) -> list[int]:
     """Node counts from `NX,NY,NZ`.
 

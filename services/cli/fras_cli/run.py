@@ -25,6 +25,9 @@ LOG = "audit.mcap"
 ABORT_REASON = "interrupted at the terminal"
 
 
+STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
 class FolderInUse(FrasError):
     """The folder for a trial holds the log of another one."""
 
@@ -42,9 +45,9 @@ class Interrupts:
 
 @contextmanager
 def caught_interrupts() -> Generator[Interrupts]:
-    """Catch SIGINT and SIGTERM within the block."""
+    """Catch SIGINT, SIGTERM and the closing of the terminal within the block."""
     interrupts = Interrupts()
-    before = {name: signal.signal(name, interrupts) for name in (signal.SIGINT, signal.SIGTERM)}
+    before = {name: signal.signal(name, interrupts) for name in STOPPING}
     try:
         yield interrupts
     finally:
@@ -55,7 +58,8 @@ def caught_interrupts() -> Generator[Interrupts]:
 def default_out(seeds: str) -> Path:
     """Folder of a run: `runs/<stamp>-<seed>`."""
     stamp = datetime.now(UTC).strftime("%Y%m%d-%H%M%S")
-    return Path("runs") / f"{stamp}-{seeds}"
+    names = (f"{stamp}-{seeds}{suffix}" for suffix in ("", *(f"-{n}" for n in range(2, 100))))
+    return next(path for name in names if not (path := Path("runs") / name).exists())
 
 
 def without_hold_timeout(scenario: Scenario) -> Scenario:
@@ -117,7 +121,6 @@ def run_trials(
         0 if every trial was a success, 1 if not, 130 if interrupted.
     """
     folders = trial_folders(scenarios, out)
-    out.mkdir(parents=True, exist_ok=True)
     outcomes: list[str] = []
     under_way: list[Path] = []
     with (

@@ -9,7 +9,7 @@ from pathlib import Path
 from fras_cli import runtime
 from fras_cli.link import Link
 from fras_common.errors import FrasError
-from fras_supervisor import Exit, Stack, find_table, free_port, load_table
+from fras_supervisor import Endpoint, Exit, Stack, find_table, free_port, load_table
 from fras_supervisor.logs import Echo
 
 COMPLETE_TIMEOUT_S = 5.0
@@ -158,6 +158,9 @@ def use_stack(
     tell : callable
         Gets which of them it is, in words.
     """
+    runtime.record_path(cell)  # a name that can't be one is refused before anything starts
+    if connect is not None:
+        Endpoint.parse(connect)
     kept = runtime.find(cell) if connect is None and port is None else None
     if connect is not None:
         tell(f"using the stack of cell {cell} at {connect}")

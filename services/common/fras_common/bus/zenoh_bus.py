@@ -310,6 +310,8 @@ def _client_config(cell: str, connect: str, open_timeout_s: float) -> zenoh.Conf
         "connect/exit_on_failure": True,
         "scouting/multicast/enabled": False,
         "timestamping/enabled": True,
+        # Its segments stay behind in /dev/shm; our messages are too small to gain from it.
+        "transport/shared_memory/enabled": False,
         **TX_QUEUE,
     }
     for key, value in settings.items():
@@ -331,6 +333,8 @@ def route(listen: str, until: Callable[[], None]) -> None:
         "listen/endpoints": [listen],
         "scouting/multicast/enabled": False,
         "timestamping/enabled": True,
+        # Its segments stay behind in /dev/shm; our messages are too small to gain from it.
+        "transport/shared_memory/enabled": False,
         **TX_QUEUE,
     }
     try:
