@@ -48,6 +48,8 @@ def test_b_crossed_limit_leads_to_retreat_and_a_lateral_move(trials: Any) -> Non
     assert "stop" in phases
     assert "retreat" in phases
     verdicts: list[Verdict] = messages(log, "sa/verdict")
+    crossing = next(verdict for verdict in verdicts if verdict.level == "soft")
+    assert not crossing.visible
     after_pull = next(
         state.tick for state in states if state.action and state.action.phase == "interrupted"
     )
