@@ -115,7 +115,7 @@ def status(cell: str, connect: str | None, console: Console) -> int:
             f"{one.cpu_percent:.0f} %",
             str(one.tick) if one.tick >= 0 else "-",
             str(one.received),
-            str(one.malformed + one.wrong_trial + one.queue_dropped),
+            str(one.malformed + one.refused + one.wrong_trial + one.queue_dropped),
             str(one.gaps),
         )
     console.print(f"cell {cell} at {place}")

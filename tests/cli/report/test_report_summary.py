@@ -121,3 +121,17 @@ def test_json_has_exactly_the_fields_promised(log_path: Path) -> None:
     summary = json.loads(to_json(summarise(read_trial(log_path))))
     assert set(summary) == FIELDS
     assert set(summary["tick_ms"]) == set(summary["fe_ms"]) == {"p50", "p99"}
+
+
+def test_what_awareness_could_not_measure_is_null(new_log: Callable[..., Any], story: Any) -> None:
+    log = new_log()
+    story.write_ticks(log, 0, 1)
+    blind = msgspec.structs.replace(
+        story.verdict(2), max_force_n=-1.0, visibility=-1.0, level="invalid"
+    )
+    log.put("sa/verdict", blind)
+    log.file.close({})
+    summary = summarise(read_trial(log.file.path))
+    assert summary.visibility is None
+    assert summary.max_force_n is not None
+    assert summary.max_force_n >= 0

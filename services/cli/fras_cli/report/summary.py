@@ -79,14 +79,16 @@ def summarise(trial: Trial) -> Summary:
     ending = trial.ending
     status = trial.statuses[-1] if trial.statuses else None
     limit_n = trial.scenario.awareness.force_limit_n
-    forces = [v.max_force_n for v in trial.verdicts if math.isfinite(v.max_force_n)]
+    # SA tells what is no number as a negative one; both can have none.
+    forces = [v.max_force_n for v in trial.verdicts if 0 <= v.max_force_n < math.inf]
+    visibility = trial.verdicts[-1].visibility if trial.verdicts else -1.0
     ticks = max((state.tick for state in trial.robot), default=0)
     return Summary(
         outcome=ending.outcome if ending else "aborted",
         reason=ending.reason if ending else CUT_SHORT,
         seed=trial.scenario.seed,
         scenario_kind=status.scenario_kind if status else None,
-        visibility=trial.verdicts[-1].visibility if trial.verdicts else None,
+        visibility=visibility if visibility >= 0 else None,
         max_force_n=max(forces, default=None),
         limit_n=limit_n,
         ticks_above_limit=sum(force > limit_n for force in forces),

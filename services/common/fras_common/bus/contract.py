@@ -11,7 +11,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol, TypeVar
+from typing import Protocol, TypeVar
 
 from fras_common.codec import MalformedMessage
 from fras_common.errors import FrasError
@@ -86,7 +86,6 @@ class Call(Protocol[Req_co, Rep_contra]):
 
 
 OnMalformed = Callable[[MalformedMessage], None]
-OnReply = Callable[[Any], None]
 
 
 class Bus(Protocol):

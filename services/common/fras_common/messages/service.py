@@ -31,8 +31,9 @@ class Health(Header, frozen=True, kw_only=True):
         Resident memory and processor share (100 = one core) since the last report.
     received, published : int
         Messages since the start.
-    malformed, wrong_trial, queue_dropped, gaps : int
-        Messages refused by the codec, of another trial, for lack of room, and sequence gaps.
+    malformed, refused, wrong_trial, queue_dropped, gaps : int
+        Messages refused by the codec, by the handler for what they say, of another trial, for
+        lack of room, and sequence gaps.
     facts : dict
         What only this service can say, e.g. which linear solver it uses.
     """
@@ -44,6 +45,7 @@ class Health(Header, frozen=True, kw_only=True):
     received: int
     published: int
     malformed: int
+    refused: int
     wrong_trial: int
     queue_depth: int
     queue_dropped: int

@@ -227,6 +227,7 @@ class ServiceHost:
             received=self.counts["received"],
             published=self.counts["published"],
             malformed=self.counts["malformed"],
+            refused=self.counts["refused"],
             wrong_trial=self.gate.dropped,
             queue_depth=self._inbox.qsize(),
             queue_dropped=self.counts["queue_dropped"],
