@@ -7,9 +7,16 @@ from typing import Any
 import pytest
 
 from fras_common.codec import content_digest
-from fras_common.messages import OpenRequest, ResetReply, TaskReply, TaskRequest, TaskStatus
+from fras_common.messages import (
+    OpenRequest,
+    RecorderStatus,
+    ResetReply,
+    TaskReply,
+    TaskRequest,
+    TaskStatus,
+)
 from fras_common.scenario import RunSection, Scenario, resolve
-from fras_common.topics import RECORDER_OPEN, TASK, TASK_STATUS
+from fras_common.topics import MOTION_RESET, RECORDER_OPEN, RECORDER_STATUS, TASK, TASK_STATUS
 from fras_planner.service import PlannerService
 from support.shells import ShellBench
 
@@ -96,3 +103,16 @@ def test_one_trial_at_a_time_and_abort_names_its_trial(bench: Bench) -> None:
 
 def test_health_tells_which_knowledge_is_used(bench: Bench) -> None:
     assert len(bench.host.facts["asp_digest"]) == 64
+
+
+def test_log_that_can_not_be_written_ends_the_trial(bench: Bench) -> None:
+    bench.answer_recorder()
+    bench.client.serve(MOTION_RESET, lambda call: None)  # the trial stays in its reset
+    bench.task(scenario=SCENARIO)
+    status = RecorderStatus(
+        trial="t", state="error", path="", messages=0, bytes=0, lost=0, reason="disk full"
+    )
+    bench.client.publisher(RECORDER_STATUS).put(status)
+    bench.run_until(lambda: bench.statuses[-1].phase == "idle")
+    assert bench.statuses[-1].outcome == "aborted"
+    assert bench.statuses[-1].reason == "hold:recorder: disk full"

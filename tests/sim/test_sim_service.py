@@ -12,6 +12,7 @@ from fras_common.codec import content_digest
 from fras_common.messages import ResetRequest, TissueModel, TissueState
 from fras_common.scenario import Disc, Scenario, SceneSection, TissueSection
 from fras_common.topics import ROBOT_STATE, SIM_RESET, TISSUE_MODEL, TISSUE_STATE
+from fras_sim.fem import FactorizationFailed, TissueSimulator
 from fras_sim.service import SimService
 from support.robots import robot
 from support.shells import ShellBench
@@ -135,3 +136,23 @@ def test_reset_recovers_and_leaves_no_trace(bench: Bench) -> None:
 def test_scenario_without_a_scene_is_a_typed_fault(bench: Bench) -> None:
     with pytest.raises(RemoteFault, match="UnresolvedScenario"):
         bench.reset(scenario=Scenario(tissue=SMALL))
+
+
+def test_step_that_fails_is_answered_with_the_state_kept(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise FactorizationFailed("row 3", row=3)
+
+    bench.reset()
+    bench.put(0)
+    with monkeypatch.context() as patch:
+        patch.setattr(TissueSimulator, "step", fail)
+        bench.put(1)
+    assert [state.tick for state in bench.states] == [0, 1]
+    assert not bench.states[-1].solver.converged
+    assert bench.states[-1].nodes_m == bench.states[0].nodes_m
+    bench.reset("t2")
+    bench.put(0, trial="t2")
+    bench.put(1, trial="t2")
+    assert bench.states[-1].solver.converged
