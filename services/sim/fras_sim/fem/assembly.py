@@ -1,16 +1,23 @@
 """From element to body: where each entry of the Hessian goes, and the body's elastic energy."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fras_sim.fem.batches import LANES, make_batches
 from fras_sim.fem.element import ElementKind, quadrature
 from fras_sim.fem.element_kernels import element_kernels
 from fras_sim.fem.materials import MaterialName, lame_parameters
 from fras_sim.fem.mesh import Mesh
+from fras_sim.fem.second_core import second_core
 
 FIXED = -1
+# Batches of elements from which on a second core is worth being woken.
+WORTH_SHARING = 60
+# Adds the batches from one to another (exclusive) to an array: half, begin, end, array.
+_Adding = Callable[[int, int, int, NDArray[np.float64]], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,12 +143,16 @@ class ElasticBody:
         self.nodal_volume_m3 = np.zeros(len(mesh.nodes_m))
         np.add.at(self.nodal_volume_m3, mesh.elements, points.nodal_volumes)
         self.pattern = sparsity_pattern(mesh.elements, len(mesh.nodes_m), fixed_nodes)
-        self.no_strain = np.zeros((*points.gradients.shape[:2], 6))
         self._kernels = element_kernels(mesh.elements.shape[1], material)
-        self._elements = np.ascontiguousarray(mesh.elements, dtype=np.int32)
-        self._gradients = points.gradients
-        self._bulk = lame_lambda * points.bulk_weights
-        self._shear = lame_mu * points.shear_weights
+        batches = make_batches(mesh.elements, points)
+        self._n_batches = len(batches.elements)
+        self._mesh = (batches.elements, batches.gradients, batches.set_of)
+        self._by_element = batches.by_element
+        self._moduli = (lame_lambda * batches.bulk_weights, lame_mu * batches.shear_weights)
+        n_points = points.gradients.shape[1]
+        self.no_strain = np.zeros((self._n_batches, n_points, 6, LANES))
+        # A mesh with fewer elements is done before a second core has been woken.
+        self._halved = self._n_batches // 2 if self._n_batches >= WORTH_SHARING else 0
 
     def energy_gradient(
         self,
@@ -155,16 +166,15 @@ class ElasticBody:
         With `ratio` c > 0 and the strain at the start of the step, viscosity is included. The
         energy is infinite where the material cannot be; the gradient means nothing then.
         """
-        return self._kernels.energy_gradient(
-            x,
-            self._elements,
-            self._gradients,
-            self._bulk,
-            self._shear,
-            self.no_strain if strain_before is None else strain_before,
-            ratio,
-            force,
-        )
+        before = self.no_strain if strain_before is None else strain_before
+        given = (x, *self._mesh, *self._moduli, before, ratio)
+        energy = np.zeros(2)
+
+        def add(half: int, begin: int, end: int, to: NDArray[np.float64]) -> None:
+            energy[half] = self._kernels.energy_gradient(begin, end, *given, to)
+
+        self._in_halves(add, force)
+        return float(energy.sum())
 
     def hessian(
         self,
@@ -178,24 +188,31 @@ class ElasticBody:
 
         With `project` the matrix is positive semidefinite (`materials`).
         """
+        before = self.no_strain if strain_before is None else strain_before
+        given = (x, *self._mesh, *self._moduli, before, ratio, project)
+        given = (*given, self._by_element, self.pattern.scatter)
         values = np.zeros(self.pattern.n_entries + 1)
-        self._kernels.hessian(
-            x,
-            self._elements,
-            self._gradients,
-            self._bulk,
-            self._shear,
-            self.no_strain if strain_before is None else strain_before,
-            ratio,
-            project,
-            self.pattern.scatter,
-            values,
-        )
+
+        def add(_: int, begin: int, end: int, to: NDArray[np.float64]) -> None:
+            self._kernels.hessian(begin, end, *given, to)
+
+        self._in_halves(add, values)
         return values[:-1]
 
     def strain(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
         """Return the strain at each quadrature point and the ids of the inverted elements."""
         strain = np.empty_like(self.no_strain)
-        inverted = np.empty(len(self._elements), dtype=np.int32)
-        count = self._kernels.strains(x, self._elements, self._gradients, strain, inverted)
-        return strain, np.flatnonzero(inverted).astype(np.int32) if count else inverted[:0]
+        inverted = np.empty((self._n_batches, LANES), dtype=np.int32)
+        self._kernels.strains(0, self._n_batches, x, *self._mesh, strain, inverted)
+        ids = np.flatnonzero(inverted.ravel()[: len(self.mesh.elements)])
+        return strain, ids.astype(np.int32)
+
+    def _in_halves(self, add: _Adding, total: NDArray[np.float64]) -> None:
+        """Add up the batches, the second half of a large mesh on the second core."""
+        n, halved = self._n_batches, self._halved
+        if not halved:
+            add(0, 0, n, total)
+            return
+        other = np.zeros_like(total)
+        second_core.run(lambda: add(0, 0, halved, total), lambda: add(1, halved, n, other))
+        total += other

@@ -44,9 +44,9 @@ SOLVERS: dict[str, Callable[[SparsityPattern], LinearSolver]] = {
     "scipy": BandedCholesky,
     "scipy-single": lambda pattern: SinglePrecision(pattern, BandedCholesky),
 }
-# What `narrow_order` counts for a box of 41x49x3 nodes: below this the banded solver is faster than
-# MKL, most of all in its substitutions (half of MKL's time at 21x25x2), above it MKL is.
-WIDE = 2_000_000_000
+# Operations of a banded factorisation from which on MKL's nested dissection, on one thread, beats
+# our band, from both ends: measured up to half of it (41x49x5 nodes), ours was faster throughout.
+WIDE = 20_000_000_000
 
 
 def linear_solver(name: str, pattern: SparsityPattern) -> LinearSolver:
@@ -56,9 +56,9 @@ def linear_solver(name: str, pattern: SparsityPattern) -> LinearSolver:
     ----------
     name : str
         ``mkl`` (PARDISO) or ``scipy`` (banded); with ``-single`` the factor is kept in float32,
-        enough for a preconditioner. ``auto`` is ``mkl`` where it is installed, else ``scipy``;
-        ``fastest`` has single precision, and MKL only for bodies so wide that it pays. The
-        solver's own name says which it became.
+        enough for a preconditioner. ``auto`` is what is fastest for a step: single precision, and
+        MKL for bodies so wide that it pays, if it is installed. The solver's own name says which
+        it became.
     pattern : SparsityPattern
 
     Raises
@@ -69,11 +69,9 @@ def linear_solver(name: str, pattern: SparsityPattern) -> LinearSolver:
         If MKL is asked for by name and can't be loaded.
     """
     if name == "auto":
-        name = "mkl" if has_mkl() else "scipy"
-    elif name == "fastest":
         is_wide = envelope_cost(pattern, narrow_order(pattern)) > WIDE
         name = "mkl-single" if is_wide and has_mkl() else "scipy-single"
     if name not in SOLVERS:
-        names = sorted({*SOLVERS, "auto", "fastest"})
+        names = sorted({*SOLVERS, "auto"})
         raise BadParameter("solver", name, "one of " + ", ".join(names))
     return SOLVERS[name](pattern)

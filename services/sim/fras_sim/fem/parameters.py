@@ -87,6 +87,8 @@ class SolverOptions:
         Steps that one factor serves at most.
     refactor_within : int
         Corrections in one step after which the factor is renewed, and L-BFGS with it.
+    newton_after : int
+        Corrections in one step after which each has a factor of its own: projected Newton.
     slow_iterations : int
         A step that needed this many corrections has the next one start with a fresh factor.
     checkpoint_every : int
@@ -96,11 +98,12 @@ class SolverOptions:
 
     step_tolerance_m: float = 3e-6
     residual_tolerance_n: float = 1e-3
-    history: int = 6
+    history: int = 10
     max_iterations: int = 60
     refactor_every: int = 10
-    refactor_within: int = 10
-    slow_iterations: int = 6
+    refactor_within: int = 20
+    newton_after: int = 40
+    slow_iterations: int = 15
     checkpoint_every: int = 10
 
     def __post_init__(self) -> None:

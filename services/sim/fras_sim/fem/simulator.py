@@ -12,6 +12,7 @@ from fras_sim.fem.dynamics import ImplicitEuler, Motion
 from fras_sim.fem.errors import BadParameter
 from fras_sim.fem.grasp import ArmState, ToolInput, move_arms
 from fras_sim.fem.healing import heal
+from fras_sim.fem.linear.blas_threads import one_blas_thread
 from fras_sim.fem.linear_solver import linear_solver
 from fras_sim.fem.mesh import Mesh
 from fras_sim.fem.parameters import SolverOptions, TissueParameters
@@ -118,8 +119,8 @@ class TissueSimulator:
 
     Notes
     -----
-    Nothing is shared between simulators and nothing depends on time or threads of its own: the same
-    calls give the same bits, provided BLAS runs on one thread.
+    Nothing is shared between simulators and nothing depends on time, or on how many cores there
+    are: the same calls give the same bits.
     """
 
     def __init__(
@@ -127,7 +128,7 @@ class TissueSimulator:
         mesh: Mesh,
         parameters: TissueParameters,
         fixed_nodes: ArrayLike,
-        solver: str = "scipy",
+        solver: str = "auto",
         options: SolverOptions | None = None,
     ) -> None:
         self.mesh = mesh
@@ -205,7 +206,8 @@ class TissueSimulator:
         held = [arms[arm] for arm in sorted(arms) if len(arms[arm].nodes)]
         nodes = np.concatenate([arm.nodes for arm in held] or [np.zeros(0, dtype=np.int32)])
         nodes_at_m = np.concatenate([arm.nodes_at_m for arm in held] or [np.zeros((0, 3))])
-        solution = self._stepper.step(motion, nodes, nodes_at_m)
+        with one_blas_thread():
+            solution = self._stepper.step(motion, nodes, nodes_at_m)
         if solution.converged:
             velocity = (solution.x - motion.x) / self.parameters.dt_s
             strain, inverted = self._body.strain(solution.x)

@@ -1,17 +1,22 @@
-"""Cholesky inside an envelope, in panels as wide as BLAS likes them: numpy and scipy alone."""
+"""Cholesky inside an envelope, from both ends at once: numpy and scipy alone."""
+
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fras_sim.fem.assembly import SparsityPattern
 from fras_sim.fem.errors import FactorizationFailed
-from fras_sim.fem.linear.blas import BlockRoutines, Call
+from fras_sim.fem.linear.band import PANEL, Dtype
+from fras_sim.fem.linear.blas_threads import one_blas_thread
+from fras_sim.fem.linear.half import Half
 from fras_sim.fem.linear.ordering import envelope, inverse, narrow_order
-from fras_sim.fem.linear.triangular import COLUMNS, substitute
+from fras_sim.fem.second_core import second_core
 
-# Wide enough for BLAS-3 to pay, narrow enough not to fill much of what is outside the envelope
-# (24 to 48 are within 5 % of each other at every size). A multiple of `COLUMNS`.
-PANEL = 32
+# With fewer operations than these one core is done before the second has been woken ...
+WORTH_SPLITTING = 10_000_000
+# ... likewise with a factor of fewer numbers, when it is substituted with.
+WORTH_SHARING = 1_000_000
 
 
 class BandedCholesky:
@@ -25,80 +30,79 @@ class BandedCholesky:
 
     Notes
     -----
-    Band storage has the entry (i, j) at ``j * height + (i - j)`` = ``j * (height - 1) + i``: every
-    block below the diagonal is an ordinary column-major matrix whose leading dimension is
-    ``height - 1`` (the trick of LAPACK's ``dpbtrf``). A panel of 32 columns takes one ``potrf``,
-    one ``trsm`` and one ``syrk``. Against ``dpbtrf``, which works at full bandwidth throughout,
-    each panel is as tall as its own envelope: less than the widest wherever nodes are fixed.
+    A costly band is eliminated from its first row down and from its last row up at once, until the
+    two meet in a separator: twice the parallelism of a band and none of a dissection's fill (the
+    twisted or burn-at-both-ends factorisation; Duff, Erisman, Reid, *Direct Methods for Sparse
+    Matrices*, 2nd ed., 2017). BLAS is held to one thread meanwhile: threads of its own, on cores
+    that others use, can cost a hundredfold.
     """
 
-    def __init__(
-        self, pattern: SparsityPattern, dtype: type[np.float32] | type[np.float64] = np.float64
-    ) -> None:
-        n = pattern.n
-        padded = -(-n // COLUMNS) * COLUMNS
+    def __init__(self, pattern: SparsityPattern, dtype: Dtype = np.float64) -> None:
         self.name = "scipy" if dtype is np.float64 else "scipy-single"
-        self._order = narrow_order(pattern)
-        place = inverse(self._order)
-        self._starts = np.arange(0, padded, PANEL)
-        ends_of_columns = np.concatenate([envelope(pattern, place), np.arange(n, padded) + 1])
-        ends = ends_of_columns[np.minimum(self._starts + PANEL, padded) - 1]
-        ends = np.maximum(ends, np.minimum(self._starts + PANEL, padded))
-        self._leading = int((ends - self._starts).max())
-        self._ends = np.repeat(ends, PANEL // COLUMNS)
-        first, second = place[pattern.rows], place[pattern.indices]
-        self._place = np.minimum(first, second) * self._leading + np.maximum(first, second)
-        self._padding = np.arange(n, padded) * (self._leading + 1)
-        self._band = np.zeros(padded * (self._leading + 1), dtype=dtype)
-        self._right_side = np.zeros(padded, dtype=dtype)
-        self._routines = BlockRoutines(dtype, self._leading)
-        self._panels = [
-            self._panel(int(start), min(PANEL, padded - int(start)), int(end))
-            for start, end in zip(self._starts, ends, strict=True)
-        ]
+        self._n = pattern.n
+        order = narrow_order(pattern)
+        place = inverse(order)
+        one, other = place[pattern.rows], place[pattern.indices]
+        ends = envelope(pattern.n, np.minimum(one, other), np.maximum(one, other))
+        split = _split(ends)
+        # Rows from here on are out of reach from above the split.
+        meet = int(ends[split - 1]) if split < pattern.n else split
+        above, between, below = order[:split], order[split:meet], order[meet:]
+        self._above = Half(pattern, above, between, keeps_separator=True, dtype=dtype)
+        self._below = Half(pattern, below[::-1], between[::-1], keeps_separator=False, dtype=dtype)
+        self._shares_solving = self._above.size + self._below.size > WORTH_SHARING
 
     def factorize(self, values: NDArray[np.float64]) -> None:
         """Take new entries and factor."""
-        self._band[:] = 0.0
-        self._band[self._place] = values
-        self._band[self._padding] = 1.0
-        for start, calls in zip(self._starts, self._panels, strict=True):
-            for call in calls:
-                call()
-            if self._routines.info.value != 0:
-                raise _not_positive(self._order, int(start) + self._routines.info.value - 1)
-        if not np.isfinite(self._band[:: self._leading + 1]).all():
-            raise _not_positive(self._order, 0)
+        above, below = self._above, self._below
+        with one_blas_thread():
+            failed = self._of_both(lambda half: half.eliminate(values), at_once=True)
+            # [j, i] of one block is [i, j] of the other, which is upside down.
+            above.schur[:] += np.triu(below.schur[::-1, ::-1].T)
+            failed.append(above.eliminate_separator())
+        for row in failed:
+            if row is not None:
+                raise FactorizationFailed(
+                    f"the matrix is not positive definite at row {row} of {self._n}: "
+                    "check mass, stiffness and that no coordinate is infinite",
+                    row=row,
+                )
 
     def solve(self, rhs: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return x with A x = rhs."""
-        n = len(self._order)
-        self._right_side[:n] = rhs[self._order]
-        self._right_side[n:] = 0.0
-        substitute(self._band, self._leading, self._ends, self._right_side)
-        x = np.empty(n)
-        x[self._order] = self._right_side[:n]
-        return x
+        above, below = self._above, self._below
+        self._of_both(lambda half: half.forward(rhs), at_once=self._shares_solving)
+        above.separator[:] += below.separator[::-1]
+        above.solve_separator()
+        below.separator[:] = above.separator[::-1]
+        answer = np.empty(self._n)
+        self._of_both(lambda half: half.backward(answer), at_once=self._shares_solving)
+        return answer
 
-    def _panel(self, start: int, width: int, end: int) -> list[Call]:
-        """Return what factors one panel and takes its share off what follows."""
-        size = self._band.itemsize
-        base = self._band.ctypes.data
-        diagonal = base + size * start * (self._leading + 1)
-        below = diagonal + size * width
-        following = base + size * (start + width) * (self._leading + 1)
-        height = end - start - width
-        calls = [self._routines.cholesky(width, diagonal)]
-        if height > 0:
-            calls.append(self._routines.divide(height, width, below, diagonal))
-            calls.append(self._routines.subtract_square(height, width, following, below))
-        return calls
+    def _of_both(self, work: Callable[[Half], int | None], *, at_once: bool) -> list[int | None]:
+        """Return what the work gives for either half, done at once if that is worth it."""
+        halves = (self._above, self._below)
+        if not (at_once and self._below.alone):
+            return [work(half) for half in halves]
+        results: list[int | None] = [None, None]
+
+        def do(which: int) -> None:
+            results[which] = work(halves[which])
+
+        second_core.run(lambda: do(0), lambda: do(1))
+        return results
 
 
-def _not_positive(order: NDArray[np.int64], at: int) -> FactorizationFailed:
-    row = int(order[at])
-    return FactorizationFailed(
-        f"the matrix is not positive definite at row {row} of {len(order)}: "
-        "check mass, stiffness and that no coordinate is infinite",
-        row=row,
-    )
+def _split(ends: NDArray[np.int64]) -> int:
+    """Return how many rows to eliminate from above: a multiple of 32, or all.
+
+    So many that either side costs the same, the separator counting as above.
+    """
+    n = len(ends)
+    cost = np.cumsum((ends - np.arange(n)).astype(np.float64) ** 2)
+    candidates = np.arange(PANEL, n, PANEL)
+    if cost[-1] < WORTH_SPLITTING or len(candidates) == 0:
+        return n
+    beyond = cost[-1] - cost[ends[candidates - 1] - 1]
+    best = int(candidates[np.argmin(np.abs(cost[candidates - 1] - beyond))])
+    return best if ends[best - 1] < n else n

@@ -1,27 +1,32 @@
-"""Three BLAS and LAPACK routines on blocks of a larger array, which scipy's wrappers would copy."""
+"""Three BLAS and LAPACK routines on blocks of a larger array, for compiled loops.
+
+scipy's wrappers copy such blocks and hold the interpreter's lock, numba's linear algebra knows only
+whole arrays. Here a call is prepared as a row of numbers, its routine and the addresses of its
+arguments, and made from compiled code.
+"""
 # pyright: reportUnknownVariableType=false, reportUnknownMemberType=false
 # pyright: reportUnknownArgumentType=false, reportAttributeAccessIssue=false
-# Reason: scipy.linalg ships no types.
+# pyright: reportUntypedFunctionDecorator=false, reportUnknownParameterType=false
+# pyright: reportMissingParameterType=false, reportCallIssue=false
+# Reason: neither scipy.linalg nor numba and llvmlite ship types.
 
-import ctypes
-from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import numpy as np
-from scipy.linalg import cython_blas, cython_lapack
+from llvmlite import ir
+from numba import njit, types
+from numba.extending import get_cython_function_address, intrinsic
+from numba.np.unsafe.ndarray import to_fixed_tuple
+from numpy.typing import NDArray
 
 Address = int
-Call = Callable[[], None]
-
-_pointer = ctypes.pythonapi.PyCapsule_GetPointer
-_pointer.restype, _pointer.argtypes = ctypes.c_void_p, [ctypes.py_object, ctypes.c_char_p]
-_signature = ctypes.pythonapi.PyCapsule_GetName
-_signature.restype, _signature.argtypes = ctypes.c_char_p, [ctypes.py_object]
+# Kinds of calls, the first number of their row; then the routine and its arguments.
+CHOLESKY, DIVIDE, SUBTRACT_SQUARE = 0, 1, 2
+WIDTH = 13
 
 
 class BlockRoutines:
-    """Calls on column-major blocks with one leading dimension, prepared once and made often.
+    """Calls on column-major blocks with one leading dimension.
 
     Parameters
     ----------
@@ -31,57 +36,81 @@ class BlockRoutines:
 
     Notes
     -----
-    Blocks are given by address: whoever asks for a call keeps the array alive. Preparing the
-    arguments ahead leaves a microsecond for a call. ``info`` is the result of the last `cholesky`.
+    Blocks are given by address: whoever makes the calls keeps the array alive, and this object.
+    ``info`` (1,) is the result of the last `cholesky` made.
     """
 
     def __init__(self, dtype: type[np.float32] | type[np.float64], leading: int) -> None:
-        letter, self._real = (
-            ("s", ctypes.c_float) if dtype is np.float32 else ("d", ctypes.c_double)
-        )
-        self._potrf = _routine(cython_lapack, letter + "potrf", 5)
-        self._trsm = _routine(cython_blas, letter + "trsm", 11)
-        self._syrk = _routine(cython_blas, letter + "syrk", 10)
-        self._kept: list[Any] = []
+        letter = "s" if dtype is np.float32 else "d"
+        self._potrf = _routine("cython_lapack", letter + "potrf")
+        self._trsm = _routine("cython_blas", letter + "trsm")
+        self._syrk = _routine("cython_blas", letter + "syrk")
+        self._kept: list[NDArray[Any]] = []
+        self._integers: dict[int, Address] = {}
         self._leading = self._integer(leading)
-        self._one, self._minus_one = self._keep(self._real(1.0)), self._keep(self._real(-1.0))
+        self._one, self._minus_one = (self._keep(np.array([x], dtype)) for x in (1.0, -1.0))
         self._left, self._right, self._transposed, self._no = (
-            self._keep(ctypes.c_char(letter)) for letter in (b"L", b"R", b"T", b"N")
+            self._keep(np.array([letter], "S1")) for letter in (b"L", b"R", b"T", b"N")
         )
-        self.info = ctypes.c_int(0)
+        self.info = np.zeros(1, dtype=np.int32)
 
-    def cholesky(self, n: int, a: Address) -> Call:
+    def cholesky(self, n: int, a: Address) -> list[int]:
         """Prepare A := L with L Lᵀ = A, both in the lower triangle, n x n; see ``info``."""
-        info = ctypes.addressof(self.info)
-        return _prepared(self._potrf, self._left, self._integer(n), a, self._leading, info)
+        info = self.info.ctypes.data
+        return _row(CHOLESKY, self._potrf, self._left, self._integer(n), a, self._leading, info)
 
-    def divide(self, m: int, n: int, b: Address, by: Address) -> Call:
+    def divide(self, m: int, n: int, b: Address, by: Address) -> list[int]:
         """Prepare B := B L⁻ᵀ, B m x n, L lower triangular."""
-        shape = (self._integer(m), self._integer(n))
         how = (self._right, self._left, self._transposed, self._no)
-        return _prepared(self._trsm, *how, *shape, self._one, by, self._leading, b, self._leading)
+        shape = (self._integer(m), self._integer(n))
+        blocks = (self._one, by, self._leading, b, self._leading)
+        return _row(DIVIDE, self._trsm, *how, *shape, *blocks)
 
-    def subtract_square(self, n: int, k: int, c: Address, a: Address) -> Call:
+    def subtract_square(self, n: int, k: int, c: Address, a: Address) -> list[int]:
         """Prepare C := C - A Aᵀ in the lower triangle, C n x n, A n x k."""
-        shape = (self._integer(n), self._integer(k))
-        from_a = (self._minus_one, a, self._leading)
-        return _prepared(
-            self._syrk, self._left, self._no, *shape, *from_a, self._one, c, self._leading
-        )
+        shape = (self._left, self._no, self._integer(n), self._integer(k))
+        blocks = (self._minus_one, a, self._leading, self._one, c, self._leading)
+        return _row(SUBTRACT_SQUARE, self._syrk, *shape, *blocks)
 
     def _integer(self, value: int) -> Address:
-        return self._keep(ctypes.c_int(value))
+        if value not in self._integers:
+            self._integers[value] = self._keep(np.array([value], np.int32))
+        return self._integers[value]
 
-    def _keep(self, value: Any) -> Address:
+    def _keep(self, value: NDArray[Any]) -> Address:
         self._kept.append(value)
-        return ctypes.addressof(value)
+        return value.ctypes.data
 
 
-def _routine(module: Any, name: str, n_arguments: int) -> Callable[..., None]:
-    capsule = module.__pyx_capi__[name]
-    kind = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * n_arguments)
-    return kind(_pointer(capsule, _signature(capsule)))
+def _routine(module: str, name: str) -> Address:
+    return int(get_cython_function_address(f"scipy.linalg.{module}", name))
 
 
-def _prepared(routine: Callable[..., None], *arguments: Address) -> Call:
-    return partial(routine, *map(ctypes.c_void_p, arguments))
+def _row(kind: int, routine: Address, *arguments: Address) -> list[int]:
+    return [kind, routine, *arguments, *[0] * (WIDTH - 2 - len(arguments))]
+
+
+@intrinsic
+def _call(typing_context: Any, routine: Any, arguments: Any) -> Any:
+    """Call the function at an address with pointers, given as a tuple of addresses."""
+
+    def generate(context: Any, builder: ir.IRBuilder, signature: Any, values: Any) -> Any:
+        address, tuple_of_addresses = values
+        given = [builder.extract_value(tuple_of_addresses, k) for k in range(len(arguments))]
+        # An address goes where a pointer goes: in an integer register or on the stack.
+        kind = ir.FunctionType(ir.VoidType(), [value.type for value in given])
+        builder.call(builder.inttoptr(address, kind.as_pointer()), given)
+        return context.get_dummy_value()
+
+    return types.void(routine, arguments), generate
+
+
+@njit(inline="always")
+def call_routine(row: NDArray[np.int64]) -> None:
+    """Make one prepared call."""
+    if row[0] == CHOLESKY:
+        _call(row[1], to_fixed_tuple(row[2:7], 5))
+    elif row[0] == DIVIDE:
+        _call(row[1], to_fixed_tuple(row[2:13], 11))
+    else:
+        _call(row[1], to_fixed_tuple(row[2:12], 10))

@@ -34,14 +34,13 @@ def narrow_order(pattern: SparsityPattern) -> Ints:
     )
 
 
-def envelope(pattern: SparsityPattern, place: Ints) -> Ints:
-    """Return for each column of the factor the end of its rows (exclusive), never decreasing.
+def envelope(n: int, columns: Ints, rows: Ints) -> Ints:
+    """Return for each of n columns of the factor the end of its rows (exclusive), never decreasing.
 
-    ``place`` (n,) is where each row of the pattern goes.
+    `columns` and `rows`, rows >= columns, are those of the entries of the lower triangle.
     """
-    first, second = place[pattern.rows], place[pattern.indices]
-    ends = np.arange(1, pattern.n + 1)
-    np.maximum.at(ends, np.minimum(first, second), np.maximum(first, second) + 1)
+    ends = np.arange(1, n + 1)
+    np.maximum.at(ends, columns, rows + 1)
     return np.maximum.accumulate(ends)
 
 
@@ -53,8 +52,10 @@ def envelope_cost(pattern: SparsityPattern, order: Ints) -> int:
     The sum over the columns of their squared height (George, Liu, *Computer Solution of Large
     Sparse Positive Definite Systems*, 1981, section 4.2).
     """
-    heights = envelope(pattern, inverse(order)) - np.arange(pattern.n)
-    return int((heights**2).sum())
+    place = inverse(order)
+    one, other = place[pattern.rows], place[pattern.indices]
+    ends = envelope(pattern.n, np.minimum(one, other), np.maximum(one, other))
+    return int(((ends - np.arange(pattern.n)) ** 2).sum())
 
 
 def inverse(order: Ints) -> Ints:
