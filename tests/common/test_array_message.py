@@ -114,19 +114,22 @@ def test_whatever_the_codec_lets_through_can_be_viewed(shape: tuple[int, ...]):
         ("nodes_m", np.zeros((2, 3)), "<f8"),
         ("nodes_m", np.zeros((2, 2)), "<f4"),
         ("nodal_force_n", np.zeros(3), "<f4"),
+        ("patch_force_n", np.zeros((2, 3)), "<f8"),
     ],
 )
 def test_message_refuses_an_array_of_another_type_or_shape(
     field: str, values: Any, dtype: Any
 ) -> None:
     good = {"nodes_m": Array.of(np.zeros((2, 3)), "<f4")}
-    good["nodal_force_n"] = good["nodes_m"]
+    good["nodal_force_n"] = good["patch_force_n"] = good["nodes_m"]
     raw = msgspec.to_builtins(
         {
             "max_force_n": 0.0,
             "max_node_speed_m_s": 0.0,
             "tool_force_n": {},
             "grasped": {},
+            "grasped_force_n": {},
+            "balance_residual_n": 0.0,
             "solver": SolverReport(
                 iterations=0,
                 residual=0.0,

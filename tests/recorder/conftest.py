@@ -146,7 +146,8 @@ def tissue_state(tick: int, trial: str) -> TissueState:
     )  # fmt: skip
     return TissueState(
         tick=tick, trial=trial, nodes_m=EMPTY, nodal_force_n=EMPTY, max_force_n=0.0,
-        max_node_speed_m_s=0.0, tool_force_n={}, grasped={}, solver=solver,
+        max_node_speed_m_s=0.0, tool_force_n={}, grasped={}, grasped_force_n={},
+        patch_force_n=EMPTY, balance_residual_n=0.0, solver=solver,
     )  # fmt: skip
 
 

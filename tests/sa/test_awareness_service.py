@@ -55,6 +55,9 @@ def tissue(tick: int, force_n: float = 0.0, converged: bool = True, **header: An
         max_node_speed_m_s=0.0,
         tool_force_n={},
         grasped={"psm1": [1, 2]},
+        grasped_force_n={"psm1": [(0.0, 0.0, 0.0)] * 2},
+        patch_force_n=Array.of(np.zeros((0, 3)), "<f4"),
+        balance_residual_n=0.0,
         solver=SolverReport(
             iterations=1,
             residual=0.0,
@@ -73,6 +76,7 @@ MODEL = TissueModel(
     elements=Array.of(np.arange(8)[None], "<i4"),
     surface=Array.of(FACES, "<i4"),
     fixed_nodes=Array.of(np.zeros(0), "<i4"),
+    fixed_patch=Array.of(np.zeros(0), "<i4"),
     fixed_points_m=Array.of(np.zeros((0, 3)), "<f8"),
     roi_m=(0.05, 0.06, 0.0),
     young_modulus_pa=3000.0,

@@ -3,15 +3,31 @@
 from collections.abc import Iterator
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 from structlog.testing import capture_logs
 
 from fras_common.bus import RemoteFault
 from fras_common.codec import content_digest
-from fras_common.messages import ResetRequest, TissueModel, TissueState
+from fras_common.messages import (
+    FaultRecord,
+    Header,
+    ResetRequest,
+    SimCheckpoint,
+    TissueModel,
+    TissueState,
+)
 from fras_common.scenario import Disc, Scenario, SceneSection, TissueSection
-from fras_common.topics import ROBOT_STATE, SIM_RESET, TISSUE_MODEL, TISSUE_STATE
+from fras_common.topics import (
+    FAULT,
+    ROBOT_STATE,
+    SIM_CHECKPOINT,
+    SIM_RESET,
+    TISSUE_MODEL,
+    TISSUE_STATE,
+)
+from fras_sim.adapter import build_simulator, checkpoint_of, tissue_state, tools_of
 from fras_sim.fem import FactorizationFailed, TissueSimulator
 from fras_sim.service import SimService
 from support.robots import robot
@@ -106,16 +122,79 @@ def test_grasp_follows_the_tool_and_is_reported(bench: Bench) -> None:
     assert state.tool_force_n["psm1"][2] > 0
 
 
-@pytest.mark.parametrize("tip", [(float("nan"), 0.03, 0.05), (0.05, 0.03, 0.2)])
-def test_bad_tool_pose_is_refused_and_the_tissue_unchanged(bench: Bench, tip: Any) -> None:
+@pytest.mark.parametrize(
+    ("tip", "named"),
+    [((float("nan"), 0.03, 0.05), "position_m"), ((0.05, 0.03, 0.2), "jump_m")],
+)
+def test_bad_tool_pose_is_a_typed_fault_and_the_tissue_unchanged(
+    bench: Bench, tip: Any, named: str
+) -> None:
+    faults: list[FaultRecord] = bench.heard(FAULT)
     bench.reset()
     bench.put(0)
     with capture_logs() as logs:
         bench.put(1, tip)
     assert len(bench.states) == 1
-    assert [entry["event"] for entry in logs] == ["tool pose refused, tissue unchanged"]
+    assert [entry["event"] for entry in logs] == ["message refused"]
+    (fault,) = faults
+    assert (fault.kind, fault.key, fault.tick) == ("BadToolInput", ROBOT_STATE.key, 1)
+    assert fault.trial == "t"
+    assert "psm1" in fault.text
+    assert {"arm", named} <= set(fault.values)
+    assert bench.host.counts["refused"] == 1
     bench.put(1)
     assert bench.states[-1].tick == 1
+
+
+def test_forces_are_published_by_node_patch_and_tool_and_balance(bench: Bench) -> None:
+    bench.reset()
+    corner = bench.models[0].nodes_m.floats()[-1]
+    tip = (float(corner[0]), float(corner[1]), float(corner[2]))
+    model = bench.models[0]
+    assert model.fixed_patch.shape == model.fixed_nodes.shape
+    for tick in range(12):
+        at = (tip[0], tip[1], tip[2] + 0.001 * max(0, tick - 2))
+        bench.put(tick, at, 60.0 if tick < 2 else -20.0)
+    state = bench.states[-1]
+    share = np.array(state.grasped_force_n["psm1"])
+    assert share.shape == (len(state.grasped["psm1"]), 3)
+    np.testing.assert_allclose(share.sum(axis=0), state.tool_force_n["psm1"], atol=1e-12)
+    assert state.patch_force_n.shape == (model.fixed_patch.ints().max() + 1, 3)
+    assert state.tool_force_n["psm1"][2] > 1e-3
+    # What holds it down answers the tool, but for inertia, damping and the bed.
+    assert state.patch_force_n.floats()[:, 2].sum() < 0.0
+    assert 0.0 < state.balance_residual_n < 0.02 * state.max_force_n + 1e-4
+
+
+def test_a_checkpoint_and_the_robot_after_it_give_the_same_tissue_again(bench: Bench) -> None:
+    checkpoints: list[SimCheckpoint] = bench.heard(SIM_CHECKPOINT)
+    bench.reset()
+    corner = bench.models[0].nodes_m.floats()[-1]
+    robots = [
+        robot(
+            tick,
+            (float(corner[0]), float(corner[1]), float(corner[2]) + 0.001 * max(0, tick - 2)),
+            60.0 if tick < 2 else -20.0,
+        )
+        for tick in range(27)
+    ]
+    for state in robots:
+        bench.robot.put(state)
+        bench.settle()
+    assert [checkpoint.tick for checkpoint in checkpoints] == [10, 20]
+    # As it travels: encoded and decoded.
+    message = msgspec.msgpack.decode(msgspec.msgpack.encode(checkpoints[-1]), type=SimCheckpoint)
+    fresh = build_simulator(Scenario(tissue=SMALL, scene=SCENE))
+    fresh.restore(checkpoint_of(message))
+    for state in robots[21:]:
+        result = fresh.step(tools_of(state))
+        published = bench.states[state.tick]
+        again = tissue_state(result, state.tick, "t", published.solver.wall_s)
+        assert msgspec.structs.replace(again, **header_of(published)) == published
+
+
+def header_of(message: Header) -> dict[str, Any]:
+    return {name: getattr(message, name) for name in ("stamp_ns", "seq", "source")}
 
 
 def test_reset_recovers_and_leaves_no_trace(bench: Bench) -> None:

@@ -76,6 +76,7 @@ class Query(Generic[Req, Rep]):
 
 TISSUE_MODEL = Topic("sim/tissue_model", m.TissueModel, "sim", Qos.EVENT, "each reset")
 TISSUE_STATE = Topic("sim/tissue_state", m.TissueState, "sim", Qos.STATE, "each tick")
+SIM_CHECKPOINT = Topic("sim/checkpoint", m.SimCheckpoint, "sim", Qos.STATE, "every 10 ticks")
 ROBOT_STATE = Topic("robot/state", m.RobotState, "motion", Qos.STATE, "each tick")
 VERDICT = Topic("sa/verdict", m.Verdict, "sa", Qos.STATE, "each tick")
 CONTEXT = Topic("sa/context", m.Context, "sa", Qos.EVENT, "on request")
@@ -91,11 +92,15 @@ RECORDER_STATUS = Topic(
 )
 HEALTH = Topic("health/{service}", m.Health, "*", Qos.TELEMETRY, "2 Hz", in_trial=False)
 LOG = Topic("log/{service}", m.LogRecord, "*", Qos.STATE, "from WARNING up", in_trial=False)
+FAULT = Topic(
+    "fault/{service}", m.FaultRecord, "*", Qos.STATE, "each refused message", in_trial=False
+)
 RPC = Topic("rpc/{service}/{name}", m.RpcRecord, "*", Qos.STATE, "each query", in_trial=False)
 
 TOPICS: tuple[Topic[Any], ...] = (
     TISSUE_MODEL,
     TISSUE_STATE,
+    SIM_CHECKPOINT,
     ROBOT_STATE,
     VERDICT,
     CONTEXT,
@@ -105,6 +110,7 @@ TOPICS: tuple[Topic[Any], ...] = (
     RECORDER_STATUS,
     HEALTH,
     LOG,
+    FAULT,
     RPC,
 )
 

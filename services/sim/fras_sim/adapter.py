@@ -4,7 +4,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fras_common.errors import FrasError
-from fras_common.messages import Array, RobotState, SolverReport, TissueModel, TissueState, Vec3
+from fras_common.messages import (
+    Array,
+    HeldNodes,
+    RobotState,
+    SimCheckpoint,
+    SolverReport,
+    TissueModel,
+    TissueState,
+    Vec3,
+)
 from fras_common.scenario import (
     Scenario,
     SceneSection,
@@ -13,7 +22,16 @@ from fras_common.scenario import (
     nodes_in_discs,
 )
 from fras_common.scenario.mesh import SIZE_ROUNDING_M
-from fras_sim.fem import Mesh, StepResult, TissueParameters, TissueSimulator, ToolInput, box_mesh
+from fras_sim.fem import (
+    ArmState,
+    Checkpoint,
+    Mesh,
+    StepResult,
+    TissueParameters,
+    TissueSimulator,
+    ToolInput,
+    box_mesh,
+)
 from fras_sim.fem.underside import underside_height
 from fras_sim.mesh_file import mesh_facts, read_mesh
 
@@ -114,12 +132,21 @@ def tissue_model(simulator: TissueSimulator, scenario: Scenario, trial: str) -> 
         elements=Array.of(mesh.elements, "<i4"),
         surface=Array.of(mesh.surface, "<i4"),
         fixed_nodes=Array.of(simulator.fixed_nodes, "<i4"),
+        fixed_patch=Array.of(patch_of(simulator), "<i4"),
         fixed_points_m=Array.of(fixed_points(mesh, scenario, scene), "<f8"),
         roi_m=scene.roi_m,
         young_modulus_pa=scenario.tissue.young_modulus_pa,
         poisson_ratio=scenario.tissue.poisson_ratio,
         dt_s=scenario.tissue.dt_s,
     )
+
+
+def patch_of(simulator: TissueSimulator) -> NDArray[np.int32]:
+    """Return the patch of each fixed node, in their order."""
+    patch = np.zeros(len(simulator.mesh.nodes_m), dtype=np.int32)
+    for number, nodes in enumerate(simulator.patches):
+        patch[nodes] = number
+    return patch[simulator.fixed_nodes]
 
 
 def tools_of(robot: RobotState) -> dict[str, ToolInput]:
@@ -141,7 +168,10 @@ def tissue_state(result: StepResult, tick: int, trial: str, wall_s: float) -> Ti
         max_force_n=result.max_force_n,
         max_node_speed_m_s=result.max_node_speed_m_s,
         tool_force_n={arm: _vec3(force) for arm, force in result.tool_force_n.items()},
-        grasped={arm: [int(node) for node in nodes] for arm, nodes in result.grasped.items()},
+        grasped={arm: _ids(nodes) for arm, nodes in result.grasped.items()},
+        grasped_force_n={arm: _vec3s(force) for arm, force in result.grasped_force_n.items()},
+        patch_force_n=Array.of(result.patch_force_n, "<f4"),
+        balance_residual_n=result.balance_residual_n,
         solver=SolverReport(
             iterations=report.iterations,
             residual=report.residual,
@@ -151,6 +181,57 @@ def tissue_state(result: StepResult, tick: int, trial: str, wall_s: float) -> Ti
             inverted_elements=report.inverted_elements,
         ),
     )
+
+
+def checkpoint_message(checkpoint: Checkpoint, trial: str) -> SimCheckpoint:
+    """Put a checkpoint on the wire, every bit of it."""
+    return SimCheckpoint(
+        tick=checkpoint.tick,
+        trial=trial,
+        nodes_m=Array.of(checkpoint.nodes_m, "<f8"),
+        velocity_m_s=Array.of(checkpoint.velocity_m_s, "<f8"),
+        support_n=Array.of(checkpoint.support_n, "<f8"),
+        balance_residual_n=checkpoint.balance_residual_n,
+        arms={
+            arm: HeldNodes(
+                position_m=_vec3(held.position_m),
+                closed=held.closed,
+                nodes=_ids(held.nodes),
+                offsets_m=_vec3s(held.offsets_m),
+            )
+            for arm, held in checkpoint.arms.items()
+        },
+        settling=checkpoint.settling,
+    )
+
+
+def checkpoint_of(message: SimCheckpoint) -> Checkpoint:
+    """Take a checkpoint off the wire."""
+    return Checkpoint(
+        message.tick,
+        message.nodes_m.floats(),
+        message.velocity_m_s.floats(),
+        message.support_n.floats(),
+        message.balance_residual_n,
+        {
+            arm: ArmState(
+                np.array(held.position_m),
+                held.closed,
+                np.array(held.nodes, dtype=np.int32),
+                np.array(held.offsets_m).reshape(-1, 3),
+            )
+            for arm, held in message.arms.items()
+        },
+        message.settling,
+    )
+
+
+def _ids(nodes: NDArray[np.int32]) -> list[int]:
+    return [int(node) for node in nodes]
+
+
+def _vec3s(rows: NDArray[np.float64]) -> list[Vec3]:
+    return [_vec3(row) for row in rows]
 
 
 def _vec3(values: NDArray[np.float64]) -> Vec3:

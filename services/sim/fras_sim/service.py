@@ -7,8 +7,14 @@ import msgspec
 from fras_common.codec import content_digest
 from fras_common.messages import ResetReply, ResetRequest, RobotState, TissueState
 from fras_common.service import ServiceHost
-from fras_common.topics import ROBOT_STATE, SIM_RESET, TISSUE_MODEL, TISSUE_STATE
-from fras_sim.adapter import build_simulator, tissue_model, tissue_state, tools_of
+from fras_common.topics import ROBOT_STATE, SIM_CHECKPOINT, SIM_RESET, TISSUE_MODEL, TISSUE_STATE
+from fras_sim.adapter import (
+    build_simulator,
+    checkpoint_message,
+    tissue_model,
+    tissue_state,
+    tools_of,
+)
 from fras_sim.fem import BadToolInput, FemError, TissueSimulator, compile_kernels
 
 
@@ -24,13 +30,16 @@ class SimService:
         host.log.info("kernels loaded", took_s=round(time.perf_counter() - began_s, 3))
         self._model = host.publisher(TISSUE_MODEL)
         self._state = host.publisher(TISSUE_STATE)
+        self._checkpoint = host.publisher(SIM_CHECKPOINT)
         host.subscribe(ROBOT_STATE, self._on_robot)
         host.serve(SIM_RESET, self._reset)
 
     def _reset(self, request: ResetRequest) -> ResetReply:
         self._simulator = build_simulator(request.scenario, request.mesh)
         self._last = None
-        self._host.facts["linear_solver"] = self._simulator.solver_name
+        solver = self._simulator.solver_name
+        self._host.facts["linear_solver"] = solver
+        self._host.log.info("tissue at rest", trial=request.trial, linear_solver=solver)
         self._model.put(tissue_model(self._simulator, request.scenario, request.trial))
         self._host.enter_trial(request.trial)
         return ResetReply(digest=content_digest(request.trial, request.scenario, request.mesh))
@@ -54,9 +63,9 @@ class SimService:
         tools = tools_of(robot)
         try:
             result = simulator.step(tools) if robot.tick > 0 else simulator.measure(tools)
-        except BadToolInput as error:
-            self._host.log.error("tool pose refused, tissue unchanged", problem=str(error))
-            return
+        except BadToolInput:
+            # The host says so on the bus; the tissue is as it was, and the tick still to come.
+            raise
         except FemError as error:
             self._host.log.error("step failed, state kept", tick=robot.tick, problem=str(error))
             self._keep_state(robot.tick)
@@ -72,6 +81,8 @@ class SimService:
         self._last = tissue_state(result, robot.tick, robot.trial, wall_s)
         self._host.tick = robot.tick
         self._state.put(self._last)
+        if robot.tick > 0 and simulator.checkpoint_due:
+            self._checkpoint.put(checkpoint_message(simulator.checkpoint(), robot.trial))
 
     def _keep_state(self, tick: int) -> None:
         """Answer for `tick` with the state before it, as one that did not converge."""

@@ -138,6 +138,7 @@ def model() -> TissueModel:
         elements=Array.of(elements, "<i4"),
         surface=Array.of(surface, "<i4"),
         fixed_nodes=Array.of(nodes_in_discs(nodes, bottom, scene.discs), "<i4"),
+        fixed_patch=Array.of(np.zeros_like(nodes_in_discs(nodes, bottom, scene.discs)), "<i4"),
         fixed_points_m=Array.of(attachment_raster(scenario().tissue.size_m, scene.discs), "<f8"),
         roi_m=scene.roi_m,
         young_modulus_pa=3000.0,
@@ -192,6 +193,9 @@ def tissue(tick: int) -> TissueState:
         max_node_speed_m_s=0.0,
         tool_force_n={},
         grasped={"psm1": [1]} if tick > 22 else {},
+        grasped_force_n={},
+        patch_force_n=Array.of(np.zeros((1, 3)), "<f4"),
+        balance_residual_n=0.0,
         solver=SolverReport(
             iterations=2, residual=1e-9, refactored=False, wall_s=0.002, converged=True,
             inverted_elements=0,

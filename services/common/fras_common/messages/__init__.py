@@ -30,13 +30,20 @@ from fras_common.messages.robot import ActionState, ArmState, RobotState
 from fras_common.messages.sa import Context, ContextRequest, TargetReply, TargetRequest, Verdict
 from fras_common.messages.service import (
     Fault,
+    FaultRecord,
     Health,
     LogRecord,
     ResetReply,
     ResetRequest,
     RpcRecord,
 )
-from fras_common.messages.sim import SolverReport, TissueModel, TissueState
+from fras_common.messages.sim import (
+    HeldNodes,
+    SimCheckpoint,
+    SolverReport,
+    TissueModel,
+    TissueState,
+)
 
 __all__ = [
     "ActionResult",
@@ -52,8 +59,10 @@ __all__ = [
     "ExecuteReply",
     "ExecuteRequest",
     "Fault",
+    "FaultRecord",
     "Header",
     "Health",
+    "HeldNodes",
     "HistoryStep",
     "HoldRequest",
     "HoldState",
@@ -70,6 +79,7 @@ __all__ = [
     "ResumeRequest",
     "RobotState",
     "RpcRecord",
+    "SimCheckpoint",
     "SolverReport",
     "TargetReply",
     "TargetRequest",

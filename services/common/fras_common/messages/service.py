@@ -68,6 +68,25 @@ class Fault(Wire, frozen=True, kw_only=True):
     text: str
 
 
+class FaultRecord(Header, frozen=True, kw_only=True):
+    """A message that a service refused for what it says, and why.
+
+    Attributes
+    ----------
+    key : str
+        Where the message came in; its tick and trial are those of this record.
+    kind : str
+        Name of the error's type.
+    values : dict
+        The numbers and names behind the text.
+    """
+
+    key: str
+    kind: str
+    text: str
+    values: dict[str, str]
+
+
 NIL = msgspec.Raw(b"\xc0")
 
 

@@ -17,11 +17,11 @@ import structlog
 from fras_common.bus import Bus, Call, Publisher
 from fras_common.codec import MalformedMessage, encode
 from fras_common.errors import FrasError
-from fras_common.messages import Fault, Header, Health, LogRecord, RpcRecord
+from fras_common.messages import Fault, FaultRecord, Header, Health, LogRecord, RpcRecord
 from fras_common.messages.service import NIL
 from fras_common.service.gate import TrialGate
 from fras_common.service.health import ProcessMeter
-from fras_common.topics import HEALTH, LOG, RPC, Query, Topic
+from fras_common.topics import FAULT, HEALTH, LOG, RPC, Query, Topic
 
 M = TypeVar("M", bound=Header)
 Req = TypeVar("Req")
@@ -92,6 +92,7 @@ class ServiceHost:
         self._inbox: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
         self._mirrors: dict[str, Publisher[RpcRecord]] = {}
         self._log_publisher: Publisher[LogRecord] | None = None
+        self._faults: Publisher[FaultRecord] | None = None
         self._seqs: dict[str, int] = {}
         self._tokens: dict[str, set[str]] = defaultdict(set)
         self._inputs: set[str] = set()
@@ -294,6 +295,21 @@ class ServiceHost:
             # Refused for what it says; anything else is our own mistake and ends the process.
             self.counts["refused"] += 1
             self.log.error("message refused", key=topic.key, problem=str(error))
+            self._publish_fault(topic, message, error)
+
+    def _publish_fault(self, topic: Topic[Any], message: Header, error: FrasError) -> None:
+        if self._faults is None:
+            self._faults = self.publisher(FAULT.of(service=self.name))
+        self._faults.put(
+            FaultRecord(
+                trial=message.trial,
+                tick=message.tick,
+                key=topic.key,
+                kind=error.kind,
+                text=str(error),
+                values={name: str(value) for name, value in error.values.items()},
+            )
+        )
 
     def _on_token(self, token: str, present: bool) -> None:
         name, _, instance = token.rpartition("/")

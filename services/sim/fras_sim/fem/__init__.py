@@ -15,7 +15,7 @@ from fras_sim.fem.errors import (
     FemError,
     NotConverged,
 )
-from fras_sim.fem.grasp import ToolInput
+from fras_sim.fem.grasp import ArmState, ToolInput
 from fras_sim.fem.mesh import Mesh, box_mesh, make_mesh
 from fras_sim.fem.parameters import SolverOptions, TissueParameters
 from fras_sim.fem.simulator import SolverReport, StepResult, TissueSimulator
@@ -24,6 +24,7 @@ from fras_sim.fem.tetrahedra import split_into_tetrahedra, with_midside_nodes
 from fras_sim.fem.warmup import compile_kernels
 
 __all__ = [
+    "ArmState",
     "BadMesh",
     "BadParameter",
     "BadToolInput",

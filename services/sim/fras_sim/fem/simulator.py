@@ -59,6 +59,8 @@ class StepResult:
         bed, weight, supports and tools. Zero to the tolerance of the solver [N].
     grasped : dict of ndarray of int32
         Nodes that each known arm leads.
+    grasped_force_n : dict of ndarray, shape (k, 3) [N]
+        The share of ``tool_force_n`` that goes to each of these nodes.
     solver : SolverReport
     """
 
@@ -71,6 +73,7 @@ class StepResult:
     patch_force_n: Array
     balance_residual_n: float
     grasped: dict[str, NDArray[np.int32]]
+    grasped_force_n: dict[str, Array]
     solver: SolverReport
 
 
@@ -318,6 +321,7 @@ class TissueSimulator:
             ).reshape(-1, 3),
             balance_residual_n=state.balance_residual_n,
             grasped={arm: held.nodes.copy() for arm, held in state.arms.items()},
+            grasped_force_n={arm: state.support_n[held.nodes] for arm, held in state.arms.items()},
             solver=report,
         )
 
