@@ -19,17 +19,17 @@ def draw(meshes: dict[str, dict[str, Any]], reference: str, path: Path) -> None:
     sizes = {mesh: prod(map(int, mesh.split("x"))) for mesh in meshes}
     methods = list(dict.fromkeys(method for rows in meshes.values() for method in rows))
     for method in methods:
-        rows = {m: rows[method] for m, rows in meshes.items() if "cpu_ms" in rows.get(method, {})}
+        rows = {m: rows[method] for m, rows in meshes.items() if "ms" in rows.get(method, {})}
         label = f"FRAS, {method}" if rows and "max_force_n" in next(iter(rows.values())) else method
         left.loglog(
             [sizes[mesh] for mesh in rows],
-            [row["cpu_ms"] for row in rows.values()],
+            [row["ms"] for row in rows.values()],
             "o-",
             label=label,
         )
     left.axhline(REAL_TIME_MS, color="0.5", linestyle="--", linewidth=1)
     left.text(min(sizes.values()), REAL_TIME_MS * 1.05, "real time", color="0.4", fontsize=8)
-    left.set(xlabel="nodes along x, y, z", ylabel="ms of one core a step", title="50 mm pull")
+    left.set(xlabel="nodes along x, y, z", ylabel="ms a step, two cores", title="50 mm pull")
     left.set_xticks(list(sizes.values()), list(sizes), rotation=30)
     left.minorticks_off()
     left.legend(fontsize=8)
