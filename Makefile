@@ -51,8 +51,9 @@ format: $(VENV)/.installed-dev ## format and mend what can be mended
 	$(BIN)/ruff check --fix .
 
 bench: $(VENV)/.installed-dev ## measure; figures belong into docs/benchmarks.md
-	$(BIN)/python -m benchmarks.loop
-	$(BIN)/python -m benchmarks.fe
+	$(BIN)/fras bench loop
+	$(BIN)/fras bench fe
+	$(BIN)/fras bench mesh
 
 clean: ## remove what was built; runs/ stays
 	rm -rf $(VENV) build dist .pytest_cache .ruff_cache .import_linter_cache .hypothesis

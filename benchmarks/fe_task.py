@@ -80,6 +80,7 @@ class Stopwatch:
     def __init__(self) -> None:
         self.spent_s: dict[str, float] = {}
         self.calls: dict[str, int] = {}
+        self.factor_bytes = 0
 
     def timed(self, name: str, call: Callable[..., Any]) -> Callable[..., Any]:
         self.spent_s[name], self.calls[name] = 0.0, 0
@@ -104,6 +105,7 @@ class TimedSolver:
 
     def __init__(self, solver: LinearSolver, watch: Stopwatch) -> None:
         self.name = solver.name
+        watch.factor_bytes = self.factor_bytes = solver.factor_bytes
         self.factorize = watch.timed("factor", solver.factorize)
         self.solve = watch.timed("solve", solver.solve)
 
@@ -151,6 +153,7 @@ def measure_fras(task: Task, solver: str, budget_s: float) -> Measured:
                 raise RuntimeError(f"tick {tick} did not converge")
             iterations.append(step.solver.iterations)
             refactored += step.solver.refactored
+    factor_bytes = watch.factor_bytes
     result.phase_ms = {name: 1e3 * spent / TICKS for name, spent in watch.spent_s.items()}
     result.phase_ms["other"] = float(np.mean(result.tick_ms)) - sum(result.phase_ms.values())
     result.notes = {
@@ -158,6 +161,9 @@ def measure_fras(task: Task, solver: str, budget_s: float) -> Measured:
         "iterations": round(float(np.mean(iterations)), 2),
         "steps_refactored": refactored,
         "calls": watch.calls,
+        "factor_mib": round(factor_bytes / 2**20, 1),
+        # A substitution reads the factor twice.
+        "solve_gb_s": round(2e-9 * factor_bytes * watch.calls["solve"] / watch.spent_s["solve"], 1),
         "max_force_n": round(step.max_force_n, 3),
     }
     return result

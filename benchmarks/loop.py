@@ -156,7 +156,7 @@ def measure(trials: int) -> dict[str, Any]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(prog="fras bench loop", description=__doc__)
     parser.add_argument("--trials", type=int, default=10)
     parser.add_argument("--json", type=Path, help="also write the figures there")
     options = parser.parse_args()

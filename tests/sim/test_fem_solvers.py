@@ -47,7 +47,7 @@ def test_lbfgs_learns_a_quadratic():
     rng = np.random.default_rng(2)
     root = rng.standard_normal((6, 6))
     matrix = root @ root.T + np.eye(6)
-    memory = LbfgsMemory(history=6)
+    memory = LbfgsMemory(history=6, n=6)
     x = rng.standard_normal(6)
     for _ in range(40):
         gradient = matrix @ x
@@ -62,7 +62,7 @@ def test_lbfgs_learns_a_quadratic():
 
 
 def test_lbfgs_ignores_pairs_without_curvature():
-    memory = LbfgsMemory(history=3)
+    memory = LbfgsMemory(history=3, n=2)
     memory.add(np.ones(2), -np.ones(2))
     np.testing.assert_array_equal(memory.direction(np.ones(2), lambda q: q.copy()), -np.ones(2))
 

@@ -190,6 +190,22 @@ def report(
     print_summary(_console(), summary, [("report", str(folder / "report.html"))])
 
 
+@app.command(context_settings=SERVICE_ARGUMENTS)
+def bench(
+    context: typer.Context,
+    name: Annotated[
+        str | None, typer.Argument(help="Which; without it, the list.", metavar="[NAME]")
+    ] = None,
+) -> None:
+    """Measure: `fras bench NAME`, with that benchmark's own options behind."""
+    from fras_cli.bench import list_benchmarks, run_benchmark
+
+    if name is None:
+        list_benchmarks(_console())
+    else:
+        raise typer.Exit(run_benchmark(name, context.args))
+
+
 @log_app.command("info")
 def log_info(
     log: Annotated[Path, typer.Argument(help="An audit log, or a run's folder.")],

@@ -15,7 +15,7 @@ from fras_sim.fem.second_core import second_core
 
 FIXED = -1
 # Batches of elements from which on a second core is worth being woken.
-WORTH_SHARING = 60
+WORTH_SHARING = 120
 # Adds the batches from one to another (exclusive) to an array: half, begin, end, array.
 _Adding = Callable[[int, int, int, NDArray[np.float64]], None]
 

@@ -121,7 +121,7 @@ class ImplicitEuler:
         stiffest = float(np.abs(body.hessian(body.mesh.nodes_m, self._ratio)).max())
         length_m = float(np.ptp(body.mesh.nodes_m, axis=0).max())
         self._rounding_n = FORCE_ROUNDING * stiffest * length_m
-        self._memory = LbfgsMemory(options.history)
+        self._memory = LbfgsMemory(options.history, body.pattern.n)
         self._hessian = np.zeros(0)
         self._held_rows = np.zeros(0, dtype=np.int32)
         self._factor_age: int | None = None

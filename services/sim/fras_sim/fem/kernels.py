@@ -7,6 +7,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from fras_sim.fem.tensors import FASTMATH
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
@@ -43,3 +45,39 @@ def symmetric_product(indptr: Ints, indices: Ints, values: Floats, vector: Float
             if column != row:
                 product[column] += values[k] * vector[row]
     return product
+
+
+_PAIRS = "i8, f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8[::1]"
+
+
+@njit(f"void({_PAIRS})", cache=True, fastmath=FASTMATH)
+def lbfgs_before(
+    added: int, steps: Floats, changes: Floats, scales: Floats, weights: Floats, q: Floats
+) -> None:
+    """Take the newest to the oldest pair off `q` and keep the weights (`lbfgs`)."""
+    history = len(scales)
+    for k in range(added - 1, max(added - history, 0) - 1, -1):
+        step, change = steps[k % history], changes[k % history]
+        product = 0.0
+        for i in range(len(q)):
+            product += step[i] * q[i]
+        weight = scales[k % history] * product
+        weights[k % history] = weight
+        for i in range(len(q)):
+            q[i] -= weight * change[i]
+
+
+@njit(f"void({_PAIRS})", cache=True, fastmath=FASTMATH)
+def lbfgs_after(
+    added: int, steps: Floats, changes: Floats, scales: Floats, weights: Floats, r: Floats
+) -> None:
+    """Put the oldest to the newest pair back onto `r`."""
+    history = len(scales)
+    for k in range(max(added - history, 0), added):
+        step, change = steps[k % history], changes[k % history]
+        product = 0.0
+        for i in range(len(r)):
+            product += change[i] * r[i]
+        share = weights[k % history] - scales[k % history] * product
+        for i in range(len(r)):
+            r[i] += share * step[i]

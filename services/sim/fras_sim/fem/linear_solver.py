@@ -23,6 +23,11 @@ class LinearSolver(Protocol):
         """What to call it in a log."""
         ...
 
+    @property
+    def factor_bytes(self) -> int:
+        """Size of the factor: what a substitution reads twice."""
+        ...
+
     def factorize(self, values: NDArray[np.float64]) -> None:
         """Take new entries, in the order of the pattern.
 

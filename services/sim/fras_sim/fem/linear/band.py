@@ -8,7 +8,7 @@ from fras_sim.fem.linear.blas import WIDTH, BlockRoutines
 
 # Wide enough for BLAS-3 to pay, narrow enough not to fill much of what is outside the envelope
 # (24 to 48 are within 5 % of each other at every size). A multiple of `COLUMNS`.
-PANEL = 32
+PANEL = 48
 Dtype = type[np.float32] | type[np.float64]
 
 
@@ -18,7 +18,7 @@ class Band:
     Parameters
     ----------
     ends : ndarray, shape (n,), int64
-        Where the rows of each column end (exclusive), never decreasing; n a multiple of 32.
+        Where the rows of each column end (exclusive), never decreasing; n a multiple of 48.
     dtype : float32 or float64
 
     Attributes
@@ -32,7 +32,7 @@ class Band:
     -----
     The entry (i, j) is at ``j * height + (i - j)`` = ``j * leading + i`` with ``leading = height -
     1``: every block below the diagonal is an ordinary column-major matrix (the trick of LAPACK's
-    ``dpbtrf``). A panel of 32 columns takes one ``potrf``, one ``trsm`` and one ``syrk``. Against
+    ``dpbtrf``). A panel of 48 columns takes one ``potrf``, one ``trsm`` and one ``syrk``. Against
     ``dpbtrf``, which works at full bandwidth throughout, each panel is as tall as its own envelope:
     less than the widest wherever nodes are fixed.
     """
@@ -61,7 +61,7 @@ class Band:
         return columns * self.leading + rows
 
     def factorize(self, first: int, last: int) -> int | None:
-        """Eliminate the columns `first` to `last` (exclusive), both multiples of 32.
+        """Eliminate the columns `first` to `last` (exclusive), both multiples of 48.
 
         What is behind them becomes their Schur complement.
 

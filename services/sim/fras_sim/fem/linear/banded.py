@@ -16,7 +16,7 @@ from fras_sim.fem.second_core import second_core
 # With fewer operations than these one core is done before the second has been woken ...
 WORTH_SPLITTING = 10_000_000
 # ... likewise with a factor of fewer numbers, when it is substituted with.
-WORTH_SHARING = 1_000_000
+WORTH_SHARING = 3_000_000
 
 
 class BandedCholesky:
@@ -51,6 +51,11 @@ class BandedCholesky:
         self._above = Half(pattern, above, between, keeps_separator=True, dtype=dtype)
         self._below = Half(pattern, below[::-1], between[::-1], keeps_separator=False, dtype=dtype)
         self._shares_solving = self._above.size + self._below.size > WORTH_SHARING
+
+    @property
+    def factor_bytes(self) -> int:
+        """Size of the factor."""
+        return self._above.factor_bytes + self._below.factor_bytes
 
     def factorize(self, values: NDArray[np.float64]) -> None:
         """Take new entries and factor."""
@@ -94,7 +99,7 @@ class BandedCholesky:
 
 
 def _split(ends: NDArray[np.int64]) -> int:
-    """Return how many rows to eliminate from above: a multiple of 32, or all.
+    """Return how many rows to eliminate from above: a multiple of 48, or all.
 
     So many that either side costs the same, the separator counting as above.
     """

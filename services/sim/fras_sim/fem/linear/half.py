@@ -29,7 +29,7 @@ class Half:
     Attributes
     ----------
     alone : int
-        Columns that are eliminated without the other half, a multiple of 32: idle rows, those of
+        Columns that are eliminated without the other half, a multiple of 48: idle rows, those of
         the identity, fill the first panel, others the last of the band.
     """
 
@@ -66,6 +66,11 @@ class Half:
     def size(self) -> int:
         """Numbers stored."""
         return self._band.values.size
+
+    @property
+    def factor_bytes(self) -> int:
+        """Size of the factor as it is substituted with."""
+        return self._band.packed.nbytes
 
     @property
     def schur(self) -> NDArray[np.floating]:

@@ -21,6 +21,7 @@ ALIGNMENT = 64
 # Places in PARDISO's table of parameters, from 0 (oneMKL reference, "pardiso iparm parameter").
 NOT_DEFAULTS, REORDERING, PRECISION, ZERO_BASED = 0, 1, 27, 34
 PIVOT_ROW = 29
+FACTOR_ENTRIES, REPORT = 17, -1
 METIS = 2
 
 
@@ -58,6 +59,7 @@ class Pardiso:
         self._options[REORDERING] = METIS
         self._options[PRECISION] = dtype is np.float32
         self._options[ZERO_BASED] = 1
+        self._options[FACTOR_ENTRIES] = REPORT
         self._call = _pardiso(
             pattern.n,
             (self._values, self._indptr, self._indices),
@@ -66,6 +68,11 @@ class Pardiso:
         )
         weakref.finalize(self, self._call, RELEASE)
         self._checked(ANALYSE)
+
+    @property
+    def factor_bytes(self) -> int:
+        """Size of the factor, by what the analysis says."""
+        return int(self._options[FACTOR_ENTRIES]) * self._values.itemsize
 
     def factorize(self, values: NDArray[np.float64]) -> None:
         """Take new entries and factor."""

@@ -35,6 +35,11 @@ class SinglePrecision:
         self._now = self._single
         self.name = self._single.name
 
+    @property
+    def factor_bytes(self) -> int:
+        """Size of the factor in use."""
+        return self._now.factor_bytes
+
     def factorize(self, values: NDArray[np.float64]) -> None:
         """Take new entries and factor."""
         try:
