@@ -74,6 +74,7 @@ def test_reset_publishes_the_tissue_at_rest(bench: Bench) -> None:
     assert len(fixed) > 0
     assert (np.hypot(fixed[:, 0] - 0.02, fixed[:, 1] - 0.09) <= 0.02).all()
     assert len(model.fixed_points_m.floats()) > len(fixed)
+    assert bench.host.facts["linear_solver"] == "scipy-single"
 
 
 def test_state_that_overtakes_the_reset_is_answered_after_it(bench: Bench) -> None:

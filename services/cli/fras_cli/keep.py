@@ -40,7 +40,10 @@ def up(cell: str, port: int, log_dir: Path, console: Console) -> int:
             def stopping() -> bool:
                 return interrupts.count > 0
 
-            with own_stack(cell, connect, log_dir, cancelled=stopping, echo=echo) as stack:
+            started = own_stack(
+                cell, connect, log_dir, cancelled=stopping, echo=echo, tell=console.print
+            )
+            with started as stack:
                 console.print(
                     f"ready after {time.monotonic() - began_s:.1f} s: cell {cell}, {connect}, "
                     f"logs in {log_dir}; Ctrl-C or `fras down --cell {cell}` stops it"

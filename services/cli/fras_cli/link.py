@@ -40,6 +40,11 @@ class Link:
             self._bus.watch_tokens(self._on_token)
         return self._bus
 
+    @property
+    def is_open(self) -> bool:
+        """Whether the bus has been needed yet."""
+        return self._bus is not None
+
     def tokens(self) -> set[str]:
         """Tokens that are there now, without their instance: `{"alive/sim", "ready/sim"}`."""
         _ = self.bus

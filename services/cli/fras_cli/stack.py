@@ -14,6 +14,7 @@ from fras_supervisor.logs import Echo
 
 COMPLETE_TIMEOUT_S = 5.0
 ABSENCE_S = 3.0
+PATIENCE_S = 3.0
 
 
 class StackIncomplete(FrasError):
@@ -84,6 +85,7 @@ def own_stack(
     log_dir: Path,
     cancelled: Callable[[], bool] = lambda: False,
     echo: Echo | None = None,
+    tell: Callable[[str], None] | None = None,
 ) -> Generator[UsedStack]:
     """Start a stack, and stop it whatever happens.
 
@@ -97,12 +99,15 @@ def own_stack(
         True ends the start.
     echo : callable, optional
         Gets each line that a service logs.
+    tell : callable, optional
+        Gets who is waited for, in words, when the start takes long.
     """
     started_ns = time.time_ns()
     endpoint = connect or f"tcp/127.0.0.1:{free_port()}"
     table = load_table(find_table("local"))
     with Link(cell, endpoint) as link:
-        stack = Stack(table, cell, endpoint, log_dir, link.tokens, cancelled=cancelled, echo=echo)
+        watched = told_when_slow(link, cancelled, tell) if tell else cancelled
+        stack = Stack(table, cell, endpoint, log_dir, link.tokens, cancelled=watched, echo=echo)
         stack.start()
         try:
             yield UsedStack(
@@ -113,6 +118,26 @@ def own_stack(
                 link.close()
             finally:
                 stack.stop()
+
+
+def told_when_slow(
+    link: Link, cancelled: Callable[[], bool], tell: Callable[[str], None]
+) -> Callable[[], bool]:
+    """Return `cancelled`, which also tells, once, who is not ready after a while."""
+    told_at_s = time.monotonic() + PATIENCE_S
+    told = False
+
+    def watched() -> bool:
+        nonlocal told
+        if not told and link.is_open and time.monotonic() > told_at_s:
+            told = True
+            tell(
+                f"waiting for {', '.join(link.missing())} (the first start of sim compiles its "
+                "kernels, half a minute)"
+            )
+        return cancelled()
+
+    return watched
 
 
 @contextmanager
@@ -173,5 +198,5 @@ def use_stack(
     else:
         tell("starting the services")
         endpoint = f"tcp/127.0.0.1:{port}" if port is not None else None
-        with own_stack(cell, endpoint, log_dir, cancelled) as used:
+        with own_stack(cell, endpoint, log_dir, cancelled, tell=tell) as used:
             yield used
