@@ -12,10 +12,12 @@ from fras_sim.fem.second_core import SecondCore
 
 def test_both_are_done_at_the_same_time():
     """Each half waits for the other: one after the other would never end."""
-    core = SecondCore()
+    core, met = SecondCore(), 0
     for _ in range(100):
         meeting = threading.Barrier(2, timeout=10.0)
         core.run(meeting.wait, meeting.wait)
+        met += not meeting.broken
+    assert met == 100
 
 
 @pytest.mark.parametrize("side", ["here", "there"])
@@ -31,6 +33,23 @@ def test_a_failure_of_either_half_comes_back_and_the_next_work_is_done(side):
     assert done == [other for other in works if other != side]
     core.run(**works)
     assert sorted(done[1:]) == ["here", "there"]
+
+
+def test_work_within_work_and_from_another_thread_is_done_one_after_the_other():
+    core, done = SecondCore(), []
+
+    def use(name):
+        core.run(lambda: done.append(f"{name} here"), lambda: done.append(f"{name} there"))
+
+    def from_another_thread():
+        other = threading.Thread(target=use, args=("other",))
+        other.start()
+        other.join()
+
+    core.run(lambda: use("within"), from_another_thread)
+    assert sorted(done) == ["other here", "other there", "within here", "within there"]
+    use("after")
+    assert sorted(done[4:]) == ["after here", "after there"]
 
 
 def _use(core, answer):

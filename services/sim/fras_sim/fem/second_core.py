@@ -22,12 +22,26 @@ class SecondCore:
 
     def __init__(self) -> None:
         self._thread: threading.Thread | None = None
+        self._free = threading.Lock()
         self._given, self._done = _closed(), _closed()
         self._work: Work | None = None
         self._failure: BaseException | None = None
 
     def run(self, here: Work, there: Work) -> None:
-        """Do both and return when both are done; what either raises is raised, `here` first."""
+        """Do both and return when both are done; what either raises is raised, `here` first.
+
+        While it is in use, by another thread or from within, they are done one after the other.
+        """
+        if not self._free.acquire(blocking=False):
+            here()
+            there()
+            return
+        try:
+            self._run(here, there)
+        finally:
+            self._free.release()
+
+    def _run(self, here: Work, there: Work) -> None:
         if self._thread is None or not self._thread.is_alive():
             self._given, self._done = _closed(), _closed()
             self._thread = threading.Thread(target=self._serve, name="second-core", daemon=True)
