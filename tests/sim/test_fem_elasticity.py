@@ -244,6 +244,30 @@ def test_energy_converges_at_its_order(kind, order, material):
     assert np.log2(coarse / fine) == pytest.approx(order, abs=0.1 if order < 3 else 0.4)
 
 
+@every_material
+@pytest.mark.parametrize("aspect", [2.0, 4.0, 10.0])
+def test_a_long_element_bends_as_a_plate_does(aspect, material):
+    """Energy of one element under a bending strain E_xx = k z, against plate theory."""
+    thick_m, k = 0.002, 1e-3
+    mesh = box_mesh((aspect * thick_m, aspect * thick_m, thick_m), (2, 2, 2))
+    centred = mesh.nodes_m - 0.5 * np.ptp(mesh.nodes_m, axis=0)
+    x = mesh.nodes_m.copy()
+    x[:, 0] += k * centred[:, 0] * centred[:, 2]
+    plate_pa = 3000.0 / (1.0 - 0.45**2)
+    exact_j = 0.5 * plate_pa * k**2 * thick_m**2 / 12.0 * (aspect * thick_m) ** 2 * thick_m
+    energy = {
+        kind: energy_and_force(body_of(mesh, kind, NONE, material), x)[0] for kind in KINDS[:2]
+    }
+    assert energy["hex8-sri"] == pytest.approx(exact_j, rel=1e-3)
+    assert energy["hex8"] > 1.8 * exact_j
+
+
+def test_a_cube_counts_its_points_in_full():
+    points = quadrature(box_mesh((0.01, 0.01, 0.01), (3, 3, 3)), "hex8-sri", 0.45)
+    np.testing.assert_allclose(points.shear_weights[:, :8].sum(axis=1), 0.005**3, rtol=1e-12)
+    np.testing.assert_allclose(points.shear_weights[:, 8], 0.0, atol=1e-20)
+
+
 def test_reduced_integration_is_softer_where_full_integration_locks():
     """A thin clamped strip, nearly incompressible, loaded at its end: one linear solve each."""
     mesh = box_mesh((0.02, 0.06, 0.005), (5, 13, 2))

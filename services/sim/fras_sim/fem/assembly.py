@@ -137,7 +137,7 @@ class ElasticBody:
         fixed_nodes: NDArray[np.int32],
         material: MaterialName = "svk",
     ) -> None:
-        points = quadrature(mesh, kind)
+        points = quadrature(mesh, kind, poisson_ratio)
         lame_lambda, lame_mu = lame_parameters(young_modulus_pa, poisson_ratio)
         self.mesh = mesh
         self.nodal_volume_m3 = np.zeros(len(mesh.nodes_m))
