@@ -97,7 +97,7 @@ class SolverOptions:
     """
 
     step_tolerance_m: float = 3e-6
-    residual_tolerance_n: float = 1e-3
+    residual_tolerance_n: float = 2e-4
     history: int = 10
     max_iterations: int = 60
     refactor_every: int = 10
