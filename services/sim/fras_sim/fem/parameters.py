@@ -112,7 +112,7 @@ class SolverOptions:
             if not value > 0.0:
                 raise BadParameter(name, value, "a positive number")
         counts = ("history", "max_iterations", "refactor_every", "refactor_within")
-        for name in (*counts, "checkpoint_every"):
+        for name in (*counts, "newton_after", "checkpoint_every"):
             value = getattr(self, name)
             if value < 1:
                 raise BadParameter(name, value, "1 or more")
