@@ -36,6 +36,8 @@ class SparsityPattern:
         For each degree of freedom, its row, or -1 if its node is fixed.
     scatter : ndarray, shape (n_elements, n_pairs, 9), int32
         Target of each entry of an element's Hessian; what belongs nowhere goes to ``n_entries``.
+    nodes_m : ndarray, shape (n_nodes, 3) [m]
+        Where the nodes are at rest: what is near is eliminated together.
     """
 
     indptr: NDArray[np.int32]
@@ -44,6 +46,7 @@ class SparsityPattern:
     free: NDArray[np.int64]
     row_of: NDArray[np.int32]
     scatter: NDArray[np.int32]
+    nodes_m: NDArray[np.float64]
 
     @property
     def n(self) -> int:
@@ -62,14 +65,14 @@ class SparsityPattern:
 
 
 def sparsity_pattern(
-    elements: NDArray[np.int32], n_nodes: int, fixed_nodes: NDArray[np.int32]
+    elements: NDArray[np.int32], nodes_m: NDArray[np.float64], fixed_nodes: NDArray[np.int32]
 ) -> SparsityPattern:
     """Return the pattern of the Hessian with the fixed nodes eliminated."""
-    is_free = np.ones((n_nodes, 3), dtype=bool)
+    is_free = np.ones(nodes_m.shape, dtype=bool)
     is_free[fixed_nodes] = False
     free = np.flatnonzero(is_free)
     n = len(free)
-    row_of = np.full((n_nodes, 3), FIXED, dtype=np.int32)
+    row_of = np.full(nodes_m.shape, FIXED, dtype=np.int32)
     row_of[is_free] = np.arange(n, dtype=np.int32)
 
     first, second = np.triu_indices(elements.shape[1])
@@ -85,7 +88,8 @@ def sparsity_pattern(
     scatter[stored] = place
     rows = (keys // n).astype(np.int32)
     indptr = np.searchsorted(rows, np.arange(n + 1)).astype(np.int32)
-    return SparsityPattern(indptr, (keys % n).astype(np.int32), rows, free, row_of, scatter)
+    columns = (keys % n).astype(np.int32)
+    return SparsityPattern(indptr, columns, rows, free, row_of, scatter, nodes_m)
 
 
 def with_identity_rows(
@@ -142,7 +146,7 @@ class ElasticBody:
         self.mesh = mesh
         self.nodal_volume_m3 = np.zeros(len(mesh.nodes_m))
         np.add.at(self.nodal_volume_m3, mesh.elements, points.nodal_volumes)
-        self.pattern = sparsity_pattern(mesh.elements, len(mesh.nodes_m), fixed_nodes)
+        self.pattern = sparsity_pattern(mesh.elements, mesh.nodes_m, fixed_nodes)
         self._kernels = element_kernels(mesh.elements.shape[1], material)
         batches = make_batches(mesh.elements, points)
         self._n_batches = len(batches.elements)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from fras_sim.fem.assembly import SparsityPattern
 from fras_sim.fem.errors import BadParameter
-from fras_sim.fem.linear.banded import BandedCholesky
+from fras_sim.fem.linear.multifrontal import MultifrontalCholesky
 from fras_sim.fem.linear.mkl_library import has_mkl
 from fras_sim.fem.linear.ordering import envelope_cost, narrow_order
 from fras_sim.fem.linear.pardiso import Pardiso
@@ -46,8 +46,8 @@ class LinearSolver(Protocol):
 SOLVERS: dict[str, Callable[[SparsityPattern], LinearSolver]] = {
     "mkl": Pardiso,
     "mkl-single": lambda pattern: SinglePrecision(pattern, Pardiso),
-    "scipy": BandedCholesky,
-    "scipy-single": lambda pattern: SinglePrecision(pattern, BandedCholesky),
+    "scipy": MultifrontalCholesky,
+    "scipy-single": lambda pattern: SinglePrecision(pattern, MultifrontalCholesky),
 }
 # Operations of a banded factorisation from which on MKL's nested dissection, on one thread, beats
 # our band, from both ends: measured up to half of it (41x49x5 nodes), ours was faster throughout.

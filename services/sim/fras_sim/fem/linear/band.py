@@ -48,7 +48,7 @@ class Band:
         sizes = TRIANGLE + GROUP * -(-heights // ROWS)
         self.starts = np.concatenate([[0], np.cumsum(sizes)])
         self.packed = np.zeros(int(self.starts[-1]), dtype=dtype)
-        self._routines = BlockRoutines(dtype, self.leading)
+        self._routines = BlockRoutines(dtype)
         rows = [self._panel(int(k), int(end)) for k, end in zip(starts, panel_ends, strict=True)]
         self._calls = np.array([row for panel in rows for row in panel], np.int64).reshape(
             -1, WIDTH
@@ -90,8 +90,8 @@ class Band:
         below = diagonal + size * PANEL
         following = diagonal + size * PANEL * (self.leading + 1)
         height = end - start - PANEL
-        calls = [self._routines.cholesky(PANEL, diagonal)]
+        calls = [self._routines.cholesky(PANEL, diagonal, self.leading)]
         if height > 0:
-            calls.append(self._routines.divide(height, PANEL, below, diagonal))
-            calls.append(self._routines.subtract_square(height, PANEL, following, below))
+            calls.append(self._routines.divide(height, PANEL, below, diagonal, self.leading))
+            calls.append(self._routines.subtract_square(height, PANEL, following, self.leading, below, self.leading))
         return calls

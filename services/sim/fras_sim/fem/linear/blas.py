@@ -20,57 +20,62 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 from numpy.typing import NDArray
 
 Address = int
+Dtype = type[np.float32] | type[np.float64]
 # Kinds of calls, the first number of their row; then the routine and its arguments.
 CHOLESKY, DIVIDE, SUBTRACT_SQUARE = 0, 1, 2
 WIDTH = 13
 
 
 class BlockRoutines:
-    """Calls on column-major blocks with one leading dimension.
+    """Calls on column-major blocks.
 
     Parameters
     ----------
     dtype : float32 or float64
-    leading : int
-        Distance between the columns of every block, in numbers.
 
     Notes
     -----
-    Blocks are given by address: whoever makes the calls keeps the array alive, and this object.
-    ``info`` (1,) is the result of the last `cholesky` made.
+    Blocks are given by address and leading dimension, the distance between their columns in
+    numbers: whoever makes the calls keeps the array alive, and this object. ``info`` (1,) is the
+    result of the last `cholesky` made.
     """
 
-    def __init__(self, dtype: type[np.float32] | type[np.float64], leading: int) -> None:
+    def __init__(self, dtype: Dtype) -> None:
         letter = "s" if dtype is np.float32 else "d"
         self._potrf = _routine("cython_lapack", letter + "potrf")
         self._trsm = _routine("cython_blas", letter + "trsm")
         self._syrk = _routine("cython_blas", letter + "syrk")
         self._kept: list[NDArray[Any]] = []
         self._integers: dict[int, Address] = {}
-        self._leading = self._integer(leading)
         self._one, self._minus_one = (self._keep(np.array([x], dtype)) for x in (1.0, -1.0))
-        self._left, self._right, self._transposed, self._no = (
+        self._lower, self._right, self._transposed, self._no = (
             self._keep(np.array([letter], "S1")) for letter in (b"L", b"R", b"T", b"N")
         )
         self.info = np.zeros(1, dtype=np.int32)
 
-    def cholesky(self, n: int, a: Address) -> list[int]:
+    def cholesky(self, n: int, a: Address, leading: int) -> list[int]:
         """Prepare A := L with L Lᵀ = A, both in the lower triangle, n x n; see ``info``."""
-        info = self.info.ctypes.data
-        return _row(CHOLESKY, self._potrf, self._left, self._integer(n), a, self._leading, info)
+        shape = (self._lower, self._integer(n))
+        return _row(
+            CHOLESKY, self._potrf, *shape, a, self._integer(leading), self.info.ctypes.data
+        )
 
-    def divide(self, m: int, n: int, b: Address, by: Address) -> list[int]:
-        """Prepare B := B L⁻ᵀ, B m x n, L lower triangular."""
-        how = (self._right, self._left, self._transposed, self._no)
+    def divide(self, m: int, n: int, b: Address, by: Address, leading: int) -> list[int]:
+        """Prepare B := B L⁻ᵀ, B m x n, L lower triangular; one leading dimension for both."""
+        how = (self._right, self._lower, self._transposed, self._no)
         shape = (self._integer(m), self._integer(n))
-        blocks = (self._one, by, self._leading, b, self._leading)
-        return _row(DIVIDE, self._trsm, *how, *shape, *blocks)
+        ld = self._integer(leading)
+        return _row(DIVIDE, self._trsm, *how, *shape, self._one, by, ld, b, ld)
 
-    def subtract_square(self, n: int, k: int, c: Address, a: Address) -> list[int]:
+    def subtract_square(
+        self, n: int, k: int, c: Address, leading_c: int, a: Address, leading_a: int
+    ) -> list[int]:
         """Prepare C := C - A Aᵀ in the lower triangle, C n x n, A n x k."""
-        shape = (self._left, self._no, self._integer(n), self._integer(k))
-        blocks = (self._minus_one, a, self._leading, self._one, c, self._leading)
-        return _row(SUBTRACT_SQUARE, self._syrk, *shape, *blocks)
+        shape = (self._lower, self._no, self._integer(n), self._integer(k))
+        square = (self._minus_one, a, self._integer(leading_a))
+        return _row(
+            SUBTRACT_SQUARE, self._syrk, *shape, *square, self._one, c, self._integer(leading_c)
+        )
 
     def _integer(self, value: int) -> Address:
         if value not in self._integers:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from fras_sim.fem.assembly import SparsityPattern
 from fras_sim.fem.errors import FactorizationFailed
-from fras_sim.fem.linear.banded import BandedCholesky
+from fras_sim.fem.linear.multifrontal import MultifrontalCholesky
 from fras_sim.fem.linear.pardiso import Pardiso
 
 
@@ -17,7 +17,7 @@ class SinglePrecision:
     Parameters
     ----------
     pattern : SparsityPattern
-    kind : BandedCholesky or Pardiso
+    kind : MultifrontalCholesky or Pardiso
 
     Notes
     -----
@@ -27,11 +27,11 @@ class SinglePrecision:
     """
 
     def __init__(
-        self, pattern: SparsityPattern, kind: type[BandedCholesky] | type[Pardiso]
+        self, pattern: SparsityPattern, kind: type[MultifrontalCholesky] | type[Pardiso]
     ) -> None:
         self._single = kind(pattern, np.float32)
-        self._double: BandedCholesky | Pardiso | None = None
-        self._make_double: Callable[[], BandedCholesky | Pardiso] = lambda: kind(pattern)
+        self._double: MultifrontalCholesky | Pardiso | None = None
+        self._make_double: Callable[[], MultifrontalCholesky | Pardiso] = lambda: kind(pattern)
         self._now = self._single
         self.name = self._single.name
 
