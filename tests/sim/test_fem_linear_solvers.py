@@ -1,4 +1,5 @@
 import ctypes
+import dataclasses
 import subprocess
 import sys
 from typing import Any
@@ -8,7 +9,7 @@ import pytest
 
 from fras_sim.fem import BadParameter, FactorizationFailed, box_mesh
 from fras_sim.fem.assembly import ElasticBody, sparsity_pattern
-from fras_sim.fem.linear import mkl_library, ordering
+from fras_sim.fem.linear import dissection, mkl_library
 from fras_sim.fem.linear.mkl_library import SolverUnavailable, has_mkl
 from fras_sim.fem.linear_solver import SOLVERS, linear_solver
 
@@ -30,12 +31,6 @@ def stiffness(body):
     return values
 
 
-def shuffled(mesh, seed=0):
-    """The elements of a mesh whose nodes have been given new numbers."""
-    number = np.random.default_rng(seed).permutation(len(mesh.nodes_m))
-    return number[mesh.elements].astype(np.int32)
-
-
 def dense(pattern, values):
     matrix = np.zeros((pattern.n, pattern.n))
     matrix[pattern.rows, pattern.indices] = values
@@ -50,15 +45,15 @@ def random_spd(pattern, seed=0):
     return values
 
 
-@pytest.fixture(params=[False, True], ids=["from-one-end", "from-both-ends"])
-def both_ends(request, monkeypatch):
-    """The banded solver as small bodies have it, and as large ones."""
+@pytest.fixture(params=[False, True], ids=["one-core", "two-cores"])
+def cores(request, monkeypatch):
+    """The multifrontal solver as small bodies have it, and as large ones."""
     limit = 0 if request.param else np.inf
-    monkeypatch.setattr("fras_sim.fem.linear.banded.WORTH_SPLITTING", limit)
-    monkeypatch.setattr("fras_sim.fem.linear.banded.WORTH_SHARING", limit)
+    monkeypatch.setattr("fras_sim.fem.linear.multifrontal.WORTH_SPLITTING", limit)
+    monkeypatch.setattr("fras_sim.fem.linear.multifrontal.WORTH_SHARING", limit)
 
 
-@pytest.mark.usefixtures("both_ends")
+@pytest.mark.usefixtures("cores")
 @pytest.mark.parametrize("name", DOUBLE)
 @pytest.mark.parametrize("counts", [(2, 2, 2), (3, 2, 3), (7, 9, 2), (12, 5, 3), (5, 30, 2)])
 def test_it_solves(name, counts):
@@ -110,7 +105,7 @@ def test_what_single_precision_can_not_factor_double_does(name):
     np.testing.assert_array_equal(solver.solve(rhs), again.solve(rhs))
 
 
-@pytest.mark.usefixtures("both_ends")
+@pytest.mark.usefixtures("cores")
 @pytest.mark.parametrize("name", [*DOUBLE, *SINGLE])
 def test_an_indefinite_matrix_is_refused_with_its_row(name):
     body = body_of()
@@ -128,7 +123,7 @@ def test_an_indefinite_matrix_is_refused_with_its_row(name):
     assert np.isfinite(solver.solve(np.ones(body.pattern.n))).all()
 
 
-@pytest.mark.usefixtures("both_ends")
+@pytest.mark.usefixtures("cores")
 @pytest.mark.parametrize("name", [*DOUBLE, *SINGLE])
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_entries_that_are_not_finite_are_refused(name, value):
@@ -151,7 +146,7 @@ from fras_sim.fem.linear_solver import linear_solver
 def digest(name, offset=0):
     kept = np.zeros(offset)  # moves what is allocated next
     mesh = box_mesh((0.1, 0.12, 0.005), (9, 11, 3))
-    pattern = sparsity_pattern(mesh.elements, len(mesh.nodes_m), mesh.bottom_nodes[:30])
+    pattern = sparsity_pattern(mesh.elements, mesh.nodes_m, mesh.bottom_nodes[:30])
     rng = np.random.default_rng(5)
     values = rng.uniform(-0.1, 0.1, pattern.n_entries)
     values[pattern.diagonal] = 9.0
@@ -172,29 +167,80 @@ def test_the_same_bits_in_every_solver_and_process(name):
     assert own == {run.stdout.decode().strip()}
 
 
-def test_a_box_numbered_by_slices_stays_as_it_is():
-    pattern = body_of((7, 9, 2)).pattern
-    np.testing.assert_array_equal(ordering.narrow_order(pattern), np.arange(pattern.n))
-
-
-@pytest.mark.parametrize("counts", [(25, 5, 2), (5, 25, 3), (3, 4, 20)])
-@pytest.mark.parametrize("renumber", [False, True])
-def test_any_numbering_costs_about_as_little_as_slices_along_the_longest_side(counts, renumber):
+def plate(counts, fixed=(), renumber=False):
     mesh = box_mesh(node_counts=counts)
-    elements = shuffled(mesh) if renumber else mesh.elements
-    none_fixed = np.zeros(0, dtype=np.int32)
-    pattern = sparsity_pattern(elements, len(mesh.nodes_m), none_fixed)
-    order = ordering.narrow_order(pattern)
-    np.testing.assert_array_equal(np.sort(order), np.arange(pattern.n))
-    slice_rows = 3 * np.prod(sorted(counts)[:2])
-    assert ordering.envelope_cost(pattern, order) <= pattern.n * (2.0 * slice_rows) ** 2
+    elements, nodes_m = mesh.elements, mesh.nodes_m
+    if renumber:
+        number = np.random.default_rng(0).permutation(len(nodes_m))
+        elements = number[elements].astype(np.int32)
+        nodes_m = nodes_m[np.argsort(number)]
+    return sparsity_pattern(elements, nodes_m, np.array(fixed, dtype=np.int32))
 
 
-@pytest.mark.usefixtures("both_ends")
+@pytest.mark.parametrize("counts", [(2, 2, 2), (9, 7, 2), (5, 25, 3), (6, 6, 6)])
+@pytest.mark.parametrize("renumber", [False, True])
+def test_each_front_reaches_what_its_nodes_touch(counts, renumber):
+    fixed = np.arange(0, np.prod(counts), 5)
+    pattern = plate(counts, fixed, renumber)
+    fronts = dissection.dissect(pattern)
+    order = np.concatenate([front.own for front in fronts])
+    free = np.flatnonzero(pattern.row_of[:, 0] >= 0)
+    np.testing.assert_array_equal(np.sort(order), free)
+    place = {int(node): k for k, node in enumerate(order)}
+    graph = dissection.Graph(pattern)
+    for k, front in enumerate(fronts):
+        assert all(child < k for child in front.children)
+        last = place[int(front.own[-1])]
+        touched = set(graph.edges(front.own)[1].tolist())
+        for child in front.children:
+            touched |= set(fronts[child].border.tolist())
+        expected = sorted((node for node in touched if place[node] > last), key=place.__getitem__)
+        assert front.border.tolist() == expected
+    roots = set(range(len(fronts))) - {c for front in fronts for c in front.children}
+    assert all(len(fronts[root].border) == 0 for root in roots)
+
+
+def factor_entries(pattern):
+    return sum(
+        (3 * len(front.own)) * (3 * len(front.own) + 6 * len(front.border)) / 2
+        for front in dissection.dissect(pattern)
+    )
+
+
+@pytest.mark.parametrize("renumber", [False, True])
+def test_the_factor_of_a_plate_grows_like_n_log_n(renumber):
+    """Four times the nodes: a band would take eight times the entries."""
+    small, large = (factor_entries(plate((n, n, 2), (), renumber)) for n in (20, 40))
+    assert 4.0 < large / small < 6.0
+
+
+@pytest.mark.usefixtures("cores")
+@pytest.mark.parametrize("name", DOUBLE)
+def test_all_nodes_in_one_place_are_one_front(name):
+    """Nothing says how to cut them; the matrix is as it is."""
+    pattern = plate((5, 4, 3))
+    pattern = dataclasses.replace(pattern, nodes_m=np.zeros_like(pattern.nodes_m))
+    assert len(dissection.dissect(pattern)) == 1
+    values = random_spd(pattern)
+    solver = linear_solver(name, pattern)
+    solver.factorize(values)
+    rhs = np.ones(pattern.n)
+    exact = np.linalg.solve(dense(pattern, values), rhs)
+    np.testing.assert_allclose(solver.solve(rhs), exact, atol=1e-14)
+
+
+@pytest.mark.parametrize("name", ["scipy", "scipy-single"])
+def test_nothing_free_is_nothing_to_solve(name):
+    pattern = plate((2, 2, 2), range(8))
+    solver = linear_solver(name, pattern)
+    solver.factorize(np.zeros(0))
+    assert solver.solve(np.zeros(0)).shape == (0,)
+
+
+@pytest.mark.usefixtures("cores")
 @pytest.mark.parametrize("name", DOUBLE)
 def test_numbering_does_not_change_the_solution(name):
-    mesh = box_mesh(node_counts=(9, 4, 2))
-    pattern = sparsity_pattern(shuffled(mesh), len(mesh.nodes_m), np.arange(5, dtype=np.int32))
+    pattern = plate((9, 4, 2), range(5), renumber=True)
     values = random_spd(pattern)
     solver = linear_solver(name, pattern)
     solver.factorize(values)
@@ -203,13 +249,13 @@ def test_numbering_does_not_change_the_solution(name):
     np.testing.assert_allclose(solver.solve(rhs), exact, atol=1e-14)
 
 
-@pytest.mark.usefixtures("both_ends")
+@pytest.mark.usefixtures("cores")
 @pytest.mark.parametrize("name", DOUBLE)
 def test_a_body_in_parts(name):
     """Fixed nodes may cut what is free into pieces, down to a single node."""
     mesh = box_mesh(node_counts=(2, 7, 2))
     fixed = np.flatnonzero(np.isin(mesh.nodes_m[:, 1], mesh.nodes_m[[8, 20], 1])).astype(np.int32)
-    pattern = sparsity_pattern(mesh.elements, len(mesh.nodes_m), fixed)
+    pattern = sparsity_pattern(mesh.elements, mesh.nodes_m, fixed)
     values = random_spd(pattern)
     solver = linear_solver(name, pattern)
     solver.factorize(values)
@@ -218,19 +264,8 @@ def test_a_body_in_parts(name):
     np.testing.assert_allclose(solver.solve(rhs), exact, atol=1e-14)
 
 
-def test_a_single_column_of_nodes_is_an_order_too():
-    no_edge = np.zeros(0, dtype=np.int64)
-    np.testing.assert_array_equal(ordering.level_order(3, no_edge, no_edge), [0, 1, 2])
-
-
-def test_auto_takes_mkl_for_wide_bodies_only(monkeypatch):
-    pattern = body_of((3, 3, 2)).pattern
-    assert linear_solver("auto", pattern).name == "scipy-single"
-    monkeypatch.setattr("fras_sim.fem.linear_solver.WIDE", 0)
-    expected = "mkl-single" if has_mkl() else "scipy-single"
-    assert linear_solver("auto", pattern).name == expected
-    monkeypatch.setattr("fras_sim.fem.linear_solver.has_mkl", lambda: False)
-    assert linear_solver("auto", pattern).name == "scipy-single"
+def test_auto_needs_no_mkl():
+    assert linear_solver("auto", body_of((3, 3, 2)).pattern).name == "scipy-single"
 
 
 def test_an_unknown_solver_is_named_with_the_known_ones():

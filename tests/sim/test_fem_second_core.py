@@ -83,9 +83,9 @@ def pull():
 
 def test_shared_work_gives_what_one_core_gives_and_the_same_bits_each_time(monkeypatch):
     alone = pull()
-    for name in ("assembly.WORTH_SHARING", "linear.banded.WORTH_SHARING"):
+    for name in ("assembly.WORTH_SHARING", "linear.multifrontal.WORTH_SHARING"):
         monkeypatch.setattr(f"fras_sim.fem.{name}", 0)
-    monkeypatch.setattr("fras_sim.fem.linear.banded.WORTH_SPLITTING", 0)
+    monkeypatch.setattr("fras_sim.fem.linear.multifrontal.WORTH_SPLITTING", 0)
     first, again = pull(), pull()
     np.testing.assert_array_equal(first.nodes_m, again.nodes_m)
     np.testing.assert_array_equal(first.nodal_force_n, again.nodal_force_n)

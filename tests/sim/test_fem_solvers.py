@@ -11,7 +11,7 @@ from fras_sim.fem import (
     compile_kernels,
     kernels,
 )
-from fras_sim.fem.assembly import ElasticBody, with_identity_rows
+from fras_sim.fem.assembly import ElasticBody, IdentityRows
 from fras_sim.fem.healing import heal
 from fras_sim.fem.lbfgs import LbfgsMemory
 from fras_sim.fem.linear_solver import linear_solver
@@ -40,7 +40,7 @@ def test_symmetric_product_and_identity_rows():
     rows = np.array([2, 5], dtype=np.int32)
     matrix[rows], matrix[:, rows] = 0.0, 0.0
     matrix[rows, rows] = 1.0
-    np.testing.assert_array_equal(dense(body, with_identity_rows(pattern, values, rows)), matrix)
+    np.testing.assert_array_equal(dense(body, IdentityRows(pattern, rows).put_into(values)), matrix)
 
 
 def test_lbfgs_learns_a_quadratic():

@@ -92,19 +92,28 @@ def sparsity_pattern(
     return SparsityPattern(indptr, columns, rows, free, row_of, scatter, nodes_m)
 
 
-def with_identity_rows(
-    pattern: SparsityPattern, values: NDArray[np.float64], rows: NDArray[np.int32]
-) -> NDArray[np.float64]:
-    """Return the entries of the same matrix with some rows and columns those of the identity.
+class IdentityRows:
+    """Makes some rows and columns of a matrix those of the identity.
 
     This prescribes unknowns without a new pattern.
+
+    Parameters
+    ----------
+    pattern : SparsityPattern
+    rows : ndarray of int32
     """
-    is_prescribed = np.zeros(pattern.n, dtype=bool)
-    is_prescribed[rows] = True
-    result = values[: pattern.n_entries].copy()
-    result[is_prescribed[pattern.rows] | is_prescribed[pattern.indices]] = 0.0
-    result[pattern.diagonal[rows]] = 1.0
-    return result
+
+    def __init__(self, pattern: SparsityPattern, rows: NDArray[np.int32]) -> None:
+        is_prescribed = np.zeros(pattern.n, dtype=bool)
+        is_prescribed[rows] = True
+        self._zeros = np.flatnonzero(is_prescribed[pattern.rows] | is_prescribed[pattern.indices])
+        self._ones = pattern.diagonal[rows]
+
+    def put_into(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Change the entries of a matrix in place, and return them."""
+        values[self._zeros] = 0.0
+        values[self._ones] = 1.0
+        return values
 
 
 class ElasticBody:
@@ -157,6 +166,7 @@ class ElasticBody:
         self.no_strain = np.zeros((self._n_batches, n_points, 6, LANES))
         # A mesh with fewer elements is done before a second core has been woken.
         self._halved = self._n_batches // 2 if self._n_batches >= WORTH_SHARING else 0
+        self._kept: dict[tuple[int, int], NDArray[np.float64]] = {}
 
     def energy_gradient(
         self,
@@ -177,7 +187,7 @@ class ElasticBody:
         def add(half: int, begin: int, end: int, to: NDArray[np.float64]) -> None:
             energy[half] = self._kernels.energy_gradient(begin, end, *given, to)
 
-        self._in_halves(add, force)
+        self._add_in_halves(add, force)
         return float(energy.sum())
 
     def hessian(
@@ -187,36 +197,63 @@ class ElasticBody:
         strain_before: NDArray[np.float64] | None = None,
         *,
         project: bool = True,
+        out: NDArray[np.float64] | None = None,
     ) -> NDArray[np.float64]:
         """Return the entries of d²W/dx² in the pattern [N/m].
 
-        With `project` the matrix is positive semidefinite (`materials`).
+        With `project` the matrix is positive semidefinite (`materials`). `out` (n_entries,) is
+        where to put them.
         """
         before = self.no_strain if strain_before is None else strain_before
         given = (x, *self._mesh, *self._moduli, before, ratio, project)
         given = (*given, self._by_element, self.pattern.scatter)
-        values = np.zeros(self.pattern.n_entries + 1)
+        n_entries = self.pattern.n_entries
+        values = self._scratch(0, n_entries + 1)
+        values[:] = 0.0
 
         def add(_: int, begin: int, end: int, to: NDArray[np.float64]) -> None:
             self._kernels.hessian(begin, end, *given, to)
 
-        self._in_halves(add, values)
-        return values[:-1]
+        self._add_in_halves(add, values)
+        out = np.empty(n_entries) if out is None else out
+        out[:] = values[:-1]
+        return out
 
     def strain(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
         """Return the strain at each quadrature point and the ids of the inverted elements."""
         strain = np.empty_like(self.no_strain)
         inverted = np.empty((self._n_batches, LANES), dtype=np.int32)
-        self._kernels.strains(0, self._n_batches, x, *self._mesh, strain, inverted)
+
+        def write(_: int, begin: int, end: int) -> None:
+            self._kernels.strains(begin, end, x, *self._mesh, strain, inverted)
+
+        self._in_halves(write)
         ids = np.flatnonzero(inverted.ravel()[: len(self.mesh.elements)])
         return strain, ids.astype(np.int32)
 
-    def _in_halves(self, add: _Adding, total: NDArray[np.float64]) -> None:
-        """Add up the batches, the second half of a large mesh on the second core."""
+    def _add_in_halves(self, add: _Adding, total: NDArray[np.float64]) -> None:
+        """Add up the batches, each half to an array of its own."""
+        second = self._scratch(1, total.size).reshape(total.shape) if self._halved else total
+
+        def work(half: int, begin: int, end: int) -> None:
+            if half:
+                second[:] = 0.0
+            add(half, begin, end, second if half else total)
+
+        self._in_halves(work)
+        if self._halved:
+            total += second
+
+    def _scratch(self, half: int, size: int) -> NDArray[np.float64]:
+        """Return an array that is kept: fresh memory costs more than what is added up in it."""
+        if (half, size) not in self._kept:
+            self._kept[half, size] = np.empty(size)
+        return self._kept[half, size]
+
+    def _in_halves(self, work: Callable[[int, int, int], None]) -> None:
+        """Do the batches (half, begin, end), the second half of a large mesh on the second core."""
         n, halved = self._n_batches, self._halved
-        if not halved:
-            add(0, 0, n, total)
-            return
-        other = np.zeros_like(total)
-        second_core.run(lambda: add(0, 0, halved, total), lambda: add(1, halved, n, other))
-        total += other
+        if halved:
+            second_core.run(lambda: work(0, 0, halved), lambda: work(1, halved, n))
+        else:
+            work(0, 0, n)

@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fras_sim.fem import kernels
-from fras_sim.fem.assembly import ElasticBody, with_identity_rows
+from fras_sim.fem.assembly import ElasticBody, IdentityRows
 from fras_sim.fem.contact import bed_stiffness, penetrating
 from fras_sim.fem.errors import FactorizationFailed
+from fras_sim.fem.kernels import largest
 from fras_sim.fem.lbfgs import LbfgsMemory
 from fras_sim.fem.linear_solver import LinearSolver
 from fras_sim.fem.parameters import SolverOptions, TissueParameters
@@ -118,12 +119,14 @@ class ImplicitEuler:
             if parameters.bed
             else np.zeros(n_nodes)
         )
-        stiffest = float(np.abs(body.hessian(body.mesh.nodes_m, self._ratio)).max())
+        self._hessian = body.hessian(body.mesh.nodes_m, self._ratio)
+        stiffest = float(np.abs(self._hessian).max())
         length_m = float(np.ptp(body.mesh.nodes_m, axis=0).max())
         self._rounding_n = FORCE_ROUNDING * stiffest * length_m
         self._memory = LbfgsMemory(options.history, body.pattern.n)
-        self._hessian = np.zeros(0)
+        self._matrix = np.empty_like(self._hessian)
         self._held_rows = np.zeros(0, dtype=np.int32)
+        self._led = IdentityRows(body.pattern, self._held_rows)
         self._factor_age: int | None = None
 
     def forget(self) -> None:
@@ -164,7 +167,7 @@ class ImplicitEuler:
         except FactorizationFailed:
             self.forget()
             _, gradient = self._energy(before.x, problem)
-            residual = _largest(self._reduced(gradient))
+            residual = largest(self._reduced(gradient))
             return StepSolution(before.x, gradient, 0, residual, refactored=True, converged=False)
         slow = solution.iterations >= self._options.slow_iterations
         self._factor_age = None if slow or self._factor_age is None else self._factor_age + 1
@@ -194,6 +197,7 @@ class ImplicitEuler:
         rows = self._body.pattern.row_of[held].ravel()
         if not np.array_equal(rows, self._held_rows):
             self._held_rows = rows
+            self._led = IdentityRows(self._body.pattern, rows)
             self.forget()
 
     def _energy(self, x: Array, problem: _Step) -> tuple[float, Array]:
@@ -216,11 +220,12 @@ class ImplicitEuler:
 
     def _refactor(self, x: Array, problem: _Step) -> None:
         pattern = self._body.pattern
-        self._hessian = self._body.hessian(x, self._ratio, problem.before.strain)
+        self._body.hessian(x, self._ratio, problem.before.strain, out=self._hessian)
         diagonal = np.repeat(self._inertia, 3).reshape(-1, 3)
         diagonal[:, 2] += np.where(penetrating(x), self._bed, 0.0)
         self._hessian[pattern.diagonal] += diagonal.ravel()[pattern.free]
-        self._solver.factorize(with_identity_rows(pattern, self._hessian, self._held_rows))
+        self._matrix[:] = self._hessian
+        self._solver.factorize(self._led.put_into(self._matrix))
         self._memory.clear()
         self._factor_age = 0
 
@@ -252,11 +257,11 @@ class ImplicitEuler:
         options = self._options
         reduced = self._reduced(gradient)
         if not np.isfinite(energy):
-            return StepSolution(x, gradient, 0, _largest(reduced), refactored, converged=False)
+            return StepSolution(x, gradient, 0, largest(reduced), refactored, converged=False)
         iteration = 0
         exact = refactored
         moved_m = 0.0
-        converged = _largest(reduced) <= self._rounding_n
+        converged = largest(reduced) <= self._rounding_n
         while not converged and iteration < options.max_iterations:
             iteration += 1
             if iteration % options.refactor_within == 0 or iteration > options.newton_after:
@@ -273,13 +278,11 @@ class ImplicitEuler:
             exact = False
             length, x, energy, gradient = found
             reduced_before, reduced = reduced, self._reduced(gradient)
-            moved_before_m, moved_m = moved_m, length * _largest(direction)
+            moved_before_m, moved_m = moved_m, length * largest(direction)
             if moved_m > STEP_ROUNDING * options.step_tolerance_m:
                 self._memory.add(length * direction, reduced - reduced_before)
-            converged = length == 1.0 and self._is_solved(
-                moved_before_m, moved_m, _largest(reduced)
-            )
-        return StepSolution(x, gradient, iteration, _largest(reduced), refactored, converged)
+            converged = length == 1.0 and self._is_solved(moved_before_m, moved_m, largest(reduced))
+        return StepSolution(x, gradient, iteration, largest(reduced), refactored, converged)
 
     def _is_solved(self, moved_before_m: float, moved_m: float, residual_n: float) -> bool:
         """Whether a last full correction and the force out of balance are small enough.
@@ -318,7 +321,3 @@ class ImplicitEuler:
                 return length, x_new, energy_new, gradient_new
             length *= 0.5
         return None
-
-
-def _largest(values: Array) -> float:
-    return float(np.abs(values).max(initial=0.0))

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fras_sim.fem import kernels
-from fras_sim.fem.assembly import ElasticBody, with_identity_rows
+from fras_sim.fem.assembly import ElasticBody, IdentityRows
 from fras_sim.fem.linear_solver import LinearSolver
 
 FIRST_RINGS = 2
@@ -95,7 +95,7 @@ def _linear_answer(
     load = -kernels.symmetric_product(pattern.indptr, pattern.indices, stiffness, known)
     outside = np.flatnonzero(~is_unknown).astype(np.int32)
     load[outside] = known[outside]
-    solver.factorize(with_identity_rows(pattern, stiffness, outside))
+    solver.factorize(IdentityRows(pattern, outside).put_into(stiffness.copy()))
     answer = body.mesh.nodes_m.copy()
     answer.reshape(-1)[pattern.free] += solver.solve(load)
     return answer

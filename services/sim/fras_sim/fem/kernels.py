@@ -34,6 +34,18 @@ def nodal_terms(
     return energy
 
 
+@njit("f8(f8[::1])", cache=True)
+def largest(values: Floats) -> float:
+    """Return the largest magnitude: 0 of none, infinity if one is not a number."""
+    result = 0.0
+    for k in range(len(values)):
+        magnitude = abs(values[k])
+        # Written so that what is not a number is kept: every comparison with it is false.
+        if not magnitude <= result:
+            result = magnitude if magnitude > result else np.inf
+    return result
+
+
 @njit("f8[::1](i4[::1], i4[::1], f8[::1], f8[::1])", cache=True)
 def symmetric_product(indptr: Ints, indices: Ints, values: Floats, vector: Floats) -> Floats:
     """Return A v for a symmetric A of which the upper triangle is stored by rows."""
@@ -47,12 +59,13 @@ def symmetric_product(indptr: Ints, indices: Ints, values: Floats, vector: Float
     return product
 
 
-_PAIRS = "i8, f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8[::1]"
+_PAIRS = "i8, f4[:, ::1], f4[:, ::1], f8[::1], f8[::1], f8[::1]"
+Singles = NDArray[np.float32]
 
 
 @njit(f"void({_PAIRS})", cache=True, fastmath=FASTMATH)
 def lbfgs_before(
-    added: int, steps: Floats, changes: Floats, scales: Floats, weights: Floats, q: Floats
+    added: int, steps: Singles, changes: Singles, scales: Floats, weights: Floats, q: Floats
 ) -> None:
     """Take the newest to the oldest pair off `q` and keep the weights (`lbfgs`)."""
     history = len(scales)
@@ -69,7 +82,7 @@ def lbfgs_before(
 
 @njit(f"void({_PAIRS})", cache=True, fastmath=FASTMATH)
 def lbfgs_after(
-    added: int, steps: Floats, changes: Floats, scales: Floats, weights: Floats, r: Floats
+    added: int, steps: Singles, changes: Singles, scales: Floats, weights: Floats, r: Floats
 ) -> None:
     """Put the oldest to the newest pair back onto `r`."""
     history = len(scales)

@@ -26,12 +26,13 @@ class LbfgsMemory:
     Notes
     -----
     Two-loop recursion of Nocedal, Wright, *Numerical Optimization*, 2nd ed., algorithm 7.4, with
-    the factored Hessian in the place of the scaled identity. The pairs lie in a ring.
+    the factored Hessian in the place of the scaled identity. The pairs lie in a ring, in single
+    precision: all are read for every direction, and the factor is no more exact.
     """
 
     def __init__(self, history: int, n: int) -> None:
-        self._steps = np.zeros((history, n))
-        self._changes = np.zeros((history, n))
+        self._steps = np.zeros((history, n), dtype=np.float32)
+        self._changes = np.zeros((history, n), dtype=np.float32)
         self._scales = np.zeros(history)
         self._weights = np.zeros(history)
         self._added = 0

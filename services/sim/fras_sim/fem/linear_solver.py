@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 from fras_sim.fem.assembly import SparsityPattern
 from fras_sim.fem.errors import BadParameter
 from fras_sim.fem.linear.multifrontal import MultifrontalCholesky
-from fras_sim.fem.linear.mkl_library import has_mkl
-from fras_sim.fem.linear.ordering import envelope_cost, narrow_order
 from fras_sim.fem.linear.pardiso import Pardiso
 from fras_sim.fem.linear.single import SinglePrecision
 
@@ -49,9 +47,8 @@ SOLVERS: dict[str, Callable[[SparsityPattern], LinearSolver]] = {
     "scipy": MultifrontalCholesky,
     "scipy-single": lambda pattern: SinglePrecision(pattern, MultifrontalCholesky),
 }
-# Operations of a banded factorisation from which on MKL's nested dissection, on one thread, beats
-# our band, from both ends: measured up to half of it (41x49x5 nodes), ours was faster throughout.
-WIDE = 20_000_000_000
+# Beats MKL on every body measured, 11x13x2 to 41x49x5 nodes, and needs no more than scipy.
+FASTEST = "scipy-single"
 
 
 def linear_solver(name: str, pattern: SparsityPattern) -> LinearSolver:
@@ -60,10 +57,9 @@ def linear_solver(name: str, pattern: SparsityPattern) -> LinearSolver:
     Parameters
     ----------
     name : str
-        ``mkl`` (PARDISO) or ``scipy`` (banded); with ``-single`` the factor is kept in float32,
-        enough for a preconditioner. ``auto`` is what is fastest for a step: single precision, and
-        MKL for bodies so wide that it pays, if it is installed. The solver's own name says which
-        it became.
+        ``mkl`` (PARDISO) or ``scipy`` (multifrontal); with ``-single`` the factor is kept in
+        float32, enough for a preconditioner. ``auto`` is what is fastest for a step; the solver's
+        own name says which it became.
     pattern : SparsityPattern
 
     Raises
@@ -73,9 +69,7 @@ def linear_solver(name: str, pattern: SparsityPattern) -> LinearSolver:
     SolverUnavailable
         If MKL is asked for by name and can't be loaded.
     """
-    if name == "auto":
-        is_wide = envelope_cost(pattern, narrow_order(pattern)) > WIDE
-        name = "mkl-single" if is_wide and has_mkl() else "scipy-single"
+    name = FASTEST if name == "auto" else name
     if name not in SOLVERS:
         names = sorted({*SOLVERS, "auto"})
         raise BadParameter("solver", name, "one of " + ", ".join(names))

@@ -7,9 +7,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fras_sim.fem import kernels
-from fras_sim.fem.assembly import ElasticBody, with_identity_rows
+from fras_sim.fem.assembly import ElasticBody, IdentityRows
 from fras_sim.fem.element import CELL_OF, ElementKind
 from fras_sim.fem.errors import BadParameter, FactorizationFailed, NotConverged
+from fras_sim.fem.kernels import largest
 from fras_sim.fem.linear_solver import LinearSolver, linear_solver
 from fras_sim.fem.materials import MaterialName
 from fras_sim.fem.mesh import make_mesh
@@ -136,6 +137,7 @@ class _Newton:
         self._solver = solver
         self._held = held
         self._held_rows = body.pattern.row_of[held].ravel()
+        self._led = IdentityRows(body.pattern, self._held_rows)
         self._tol = tol
         # Forces of a body at rest are rounding: a share of these is nothing.
         lengths_m = np.ptp(body.mesh.nodes_m, axis=0)
@@ -150,8 +152,8 @@ class _Newton:
         for _ in range(MAX_ITERATIONS):
             if not np.isfinite(energy):
                 raise _NoProgress
-            self.residual_n = _largest(reduced)
-            if self.residual_n <= max(self._tol * _largest(gradient), self._rounding_n):
+            self.residual_n = largest(reduced)
+            if self.residual_n <= max(self._tol * largest(gradient.ravel()), self._rounding_n):
                 return x
             self.iterations += 1
             self._factorize(x)
@@ -168,13 +170,12 @@ class _Newton:
 
     def _factorize(self, x: Array) -> Array:
         """Factor the exact tangent, or its projection where that is not positive definite."""
-        pattern = self._body.pattern
         hessian = self._body.hessian(x, project=False)
         try:
-            self._solver.factorize(with_identity_rows(pattern, hessian, self._held_rows))
+            self._solver.factorize(self._led.put_into(hessian.copy()))
         except FactorizationFailed:
             hessian = self._body.hessian(x)
-            self._solver.factorize(with_identity_rows(pattern, hessian, self._held_rows))
+            self._solver.factorize(self._led.put_into(hessian.copy()))
         return hessian
 
     def _predict(self, x: Array, lead: Array) -> Array:
@@ -205,7 +206,7 @@ class _Newton:
             energy_new, gradient, reduced_new = self._energy(x_new)
             falls = energy_new <= energy + ARMIJO * length * slope
             # Close to the solution the energy's change is rounding, the residual's is not.
-            closer = length == 1.0 and _largest(reduced_new) <= 0.5 * _largest(reduced)
+            closer = length == 1.0 and largest(reduced_new) <= 0.5 * largest(reduced)
             if np.isfinite(energy_new) and (falls or closer):
                 return x_new, energy_new, gradient, reduced_new
             length *= 0.5
@@ -231,7 +232,3 @@ def _checked_supports(
     if len(supports) < 3 or np.linalg.matrix_rank(supports - supports[0]) < 2:
         raise BadParameter("fixed", len(supports), "three supported nodes that are not on one line")
     return held.astype(np.int32), displacement.reshape(len(held), 3)
-
-
-def _largest(values: Array) -> float:
-    return float(np.abs(values).max(initial=0.0))

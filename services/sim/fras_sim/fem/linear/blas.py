@@ -56,9 +56,7 @@ class BlockRoutines:
     def cholesky(self, n: int, a: Address, leading: int) -> list[int]:
         """Prepare A := L with L Lᵀ = A, both in the lower triangle, n x n; see ``info``."""
         shape = (self._lower, self._integer(n))
-        return _row(
-            CHOLESKY, self._potrf, *shape, a, self._integer(leading), self.info.ctypes.data
-        )
+        return _row(CHOLESKY, self._potrf, *shape, a, self._integer(leading), self.info.ctypes.data)
 
     def divide(self, m: int, n: int, b: Address, by: Address, leading: int) -> list[int]:
         """Prepare B := B L⁻ᵀ, B m x n, L lower triangular; one leading dimension for both."""

@@ -104,13 +104,13 @@ def pack(work: NDArray[Any], own: int, height: int, packed: NDArray[Any]) -> boo
             finite = finite and np.isfinite(pivot)
             packed[at + (COLUMNS + 1) * a] = one / pivot
         at += TRIANGLE
-        for start in range(j + COLUMNS, height, ROWS):
-            n = min(ROWS, height - start)
-            for a in range(COLUMNS):
-                begin = (j + a) * height + start
-                packed[at : at + n] = work[begin : begin + n]
-                packed[at + n : at + ROWS] = 0.0
-                at += ROWS
+        n = height - j - COLUMNS
+        filled = (n + ROWS - 1) // ROWS * ROWS
+        for a in range(COLUMNS):
+            begin = (j + a) * height + j + COLUMNS
+            packed[at : at + n] = work[begin : begin + n]
+            packed[at + n : at + filled] = 0.0
+            at += filled
     return finite
 
 
@@ -191,16 +191,13 @@ def forward(packed: NDArray[Any], own: int, height: int, x: NDArray[Any]) -> Non
         x3 *= packed[at + 15]
         x[j], x[j + 1], x[j + 2], x[j + 3] = x0, x1, x2, x3
         at += TRIANGLE
-        for start in range(j + COLUMNS, height, ROWS):
-            below, group = x[start : start + ROWS], packed[at : at + GROUP]
-            for k in range(ROWS):
-                below[k] -= (
-                    group[k] * x0
-                    + group[ROWS + k] * x1
-                    + group[2 * ROWS + k] * x2
-                    + group[3 * ROWS + k] * x3
-                )
-            at += GROUP
+        n = (height - j - COLUMNS + ROWS - 1) // ROWS * ROWS
+        below = x[j + COLUMNS : j + COLUMNS + n]
+        column0, column1 = packed[at : at + n], packed[at + n : at + 2 * n]
+        column2, column3 = packed[at + 2 * n : at + 3 * n], packed[at + 3 * n : at + 4 * n]
+        for k in range(n):
+            below[k] -= column0[k] * x0 + column1[k] * x1 + column2[k] * x2 + column3[k] * x3
+        at += COLUMNS * n
 
 
 @njit(
@@ -211,28 +208,22 @@ def forward(packed: NDArray[Any], own: int, height: int, x: NDArray[Any]) -> Non
 )
 def backward(packed: NDArray[Any], own: int, height: int, x: NDArray[Any]) -> None:
     """Solve ``Lᵀ y = x`` for a front's own rows, given its border."""
-    sums = np.empty(GROUP, dtype=packed.dtype)
     at = len(packed)
     for j in range(own - COLUMNS, -1, -COLUMNS):
-        groups = (height - j - COLUMNS + ROWS - 1) // ROWS
-        at -= TRIANGLE + GROUP * groups
+        n = (height - j - COLUMNS + ROWS - 1) // ROWS * ROWS
+        at -= TRIANGLE + COLUMNS * n
         triangle = packed[at : at + TRIANGLE]
-        sums[:] = 0.0
-        # From the last rows to the first: memory is read in one direction here, too.
-        for g in range(groups - 1, -1, -1):
-            start, group_at = j + COLUMNS + g * ROWS, at + TRIANGLE + g * GROUP
-            below, group = x[start : start + ROWS], packed[group_at : group_at + GROUP]
-            for k in range(ROWS):
-                sums[k] += group[k] * below[k]
-                sums[ROWS + k] += group[ROWS + k] * below[k]
-                sums[2 * ROWS + k] += group[2 * ROWS + k] * below[k]
-                sums[3 * ROWS + k] += group[3 * ROWS + k] * below[k]
+        below = x[j + COLUMNS : j + COLUMNS + n]
+        begin = at + TRIANGLE
+        column0, column1 = packed[begin : begin + n], packed[begin + n : begin + 2 * n]
+        begin += 2 * n
+        column2, column3 = packed[begin : begin + n], packed[begin + n : begin + 2 * n]
         x0, x1, x2, x3 = x[j], x[j + 1], x[j + 2], x[j + 3]
-        for k in range(ROWS):
-            x0 -= sums[k]
-            x1 -= sums[ROWS + k]
-            x2 -= sums[2 * ROWS + k]
-            x3 -= sums[3 * ROWS + k]
+        for k in range(n):
+            x0 -= column0[k] * below[k]
+            x1 -= column1[k] * below[k]
+            x2 -= column2[k] * below[k]
+            x3 -= column3[k] * below[k]
         x3 *= triangle[15]
         x2 = (x2 - triangle[14] * x3) * triangle[10]
         x1 = (x1 - triangle[9] * x2 - triangle[13] * x3) * triangle[5]

@@ -49,9 +49,7 @@ class MultifrontalCholesky:
         separator = tree[last].own if last is not None else np.zeros(0, dtype=np.int64)
         self._halves = [Part(pattern, tree, group, separator, dtype) for group in groups]
         self._last = (
-            None
-            if last is None
-            else Part(pattern, _alone(tree, last), [0], separator[:0], dtype)
+            None if last is None else Part(pattern, _alone(tree, last), [0], separator[:0], dtype)
         )
         self._shares_solving = sum(half.size for half in self._halves) > WORTH_SHARING
 

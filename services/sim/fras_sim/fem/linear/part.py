@@ -1,7 +1,5 @@
 """Fronts that one core eliminates and substitutes with, one after the other."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -253,20 +251,12 @@ class _Layout:
         table[:, kernels.ENTRIES] = np.searchsorted(front, np.arange(len(table)))
 
 
-@dataclass
-class _Level:
-    """How far one of the two stacks is filled, and at most was."""
-
-    top: int = 0
-    most: int = 0
-
-
 def _rows_in(front: Ints, border: Ints, rows: Ints) -> Ints:
     """Return the rows of a front at which these local rows are."""
-    own = rows - front[kernels.FIRST]
-    return np.where(
-        own < front[kernels.OWN], own, front[kernels.OWN] + np.searchsorted(border, rows)
-    )
+    found = rows - front[kernels.FIRST]
+    is_behind = found >= front[kernels.OWN]
+    found[is_behind] = front[kernels.OWN] + np.searchsorted(border, rows[is_behind])
+    return found
 
 
 def _stack_updates(table: Ints, children: list[list[int]], sizes: Ints) -> int:
@@ -278,13 +268,12 @@ def _stack_updates(table: Ints, children: list[list[int]], sizes: Ints) -> int:
     generation = np.zeros(len(children), dtype=np.int64)
     for parent in range(len(children) - 1, -1, -1):
         generation[children[parent]] = generation[parent] + 1
-    stacks = (_Level(), _Level())
+    top, most = [0, 0], [0, 0]
     for k, those in enumerate(children):
-        stack = stacks[generation[k] % 2]
-        table[k, kernels.UPDATE] = stack.top
-        stack.top += int(sizes[k]) ** 2
-        stack.most = max(stack.most, stack.top)
-        stacks[1 - generation[k] % 2].top -= sum(int(sizes[c]) ** 2 for c in those)
-    is_odd = np.flatnonzero(generation % 2)
-    table[is_odd, kernels.UPDATE] += stacks[0].most
-    return stacks[0].most + stacks[1].most
+        stack = int(generation[k] % 2)
+        table[k, kernels.UPDATE] = top[stack]
+        top[stack] += int(sizes[k]) ** 2
+        most[stack] = max(most[stack], top[stack])
+        top[1 - stack] -= sum(int(sizes[c]) ** 2 for c in those)
+    table[np.flatnonzero(generation % 2), kernels.UPDATE] += most[0]
+    return sum(most)
