@@ -78,7 +78,9 @@ class SolverOptions:
     step_tolerance_m : float
         A step is solved when its last full correction moved no node further than this [m].
     residual_tolerance_n : float
-        ... and no free node is left with a larger force out of balance [N].
+        ... and no free node is left with a larger force out of balance [N] ...
+    balance_tolerance_n : float
+        ... nor all of them together, which is what the forces on the body lack to balance [N].
     history : int
         Pairs that L-BFGS remembers.
     max_iterations : int
@@ -98,6 +100,7 @@ class SolverOptions:
 
     step_tolerance_m: float = 3e-6
     residual_tolerance_n: float = 2e-4
+    balance_tolerance_n: float = 1e-4
     history: int = 10
     max_iterations: int = 60
     refactor_every: int = 10
@@ -107,7 +110,7 @@ class SolverOptions:
     checkpoint_every: int = 10
 
     def __post_init__(self) -> None:
-        for name in ("step_tolerance_m", "residual_tolerance_n"):
+        for name in ("step_tolerance_m", "residual_tolerance_n", "balance_tolerance_n"):
             value = getattr(self, name)
             if not value > 0.0:
                 raise BadParameter(name, value, "a positive number")
