@@ -27,8 +27,8 @@ STEP_ROUNDING = 1e-3
 # A correction of so many tolerances is near the solution; so is the square of it for the residual,
 # which falls faster.
 NEAR = 5.0
-# Corrections of a step after which it is worth to go on at its acceleration: that saves a tenth of the
-# corrections, and costs as many after harder ones.
+# Corrections of a step after which the next guess goes on at its acceleration: a tenth fewer
+# corrections, as many more after harder ones.
 EASY = 8
 # Forces of a body at rest are rounding: this share of stiffness times length.
 FORCE_ROUNDING = 1e-14
