@@ -13,6 +13,8 @@ from fras_sim.fem.materials import MaterialName, lame_parameters
 from fras_sim.fem.mesh import Mesh
 from fras_sim.fem.second_core import second_core
 
+# An annotation within a function is evaluated at each of its calls: a name costs nothing.
+Floats = NDArray[np.float64]
 FIXED = -1
 # Batches of elements from which on a second core is worth being woken.
 WORTH_SHARING = 120
@@ -184,7 +186,7 @@ class ElasticBody:
         given = (x, *self._mesh, *self._moduli, before, ratio)
         energy = np.zeros(2)
 
-        def add(half: int, begin: int, end: int, to: NDArray[np.float64]) -> None:
+        def add(half: int, begin: int, end: int, to: Floats) -> None:
             energy[half] = self._kernels.energy_gradient(begin, end, *given, to)
 
         self._add_in_halves(add, force)
@@ -211,7 +213,7 @@ class ElasticBody:
         values = self._scratch(0, n_entries + 1)
         values[:] = 0.0
 
-        def add(_: int, begin: int, end: int, to: NDArray[np.float64]) -> None:
+        def add(_: int, begin: int, end: int, to: Floats) -> None:
             self._kernels.hessian(begin, end, *given, to)
 
         self._add_in_halves(add, values)

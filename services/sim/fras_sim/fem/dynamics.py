@@ -1,5 +1,6 @@
 """One implicit Euler step as the minimisation of an energy."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,9 +25,6 @@ ENERGY_ROUNDING = 1e-13
 WORK_ROUNDING = 1e-6
 # Steps below this share of the tolerance teach L-BFGS nothing but rounding.
 STEP_ROUNDING = 1e-3
-# A correction of so many tolerances is near the solution; so is the square of it for the residual,
-# which falls faster.
-NEAR = 5.0
 # Corrections of a step after which the next guess goes on at its acceleration: a tenth fewer
 # corrections, as many more after harder ones.
 EASY = 8
@@ -296,24 +294,10 @@ class ImplicitEuler:
         return StepSolution(x, gradient, iteration, largest(reduced), refactored, converged)
 
     def _is_solved(self, moved_before_m: float, moved_m: float, reduced: Array) -> bool:
-        """Whether a last full correction and the forces out of balance are small enough.
-
-        A sequence that contracts by a factor r has ``r / (1 - r)`` of its last correction left
-        (Hairer, Wanner, *Solving Ordinary Differential Equations II*, section IV.8). One quotient
-        may flatter: it is believed near the tolerance, and where the residual is small as well.
-        """
         residual_n = largest(reduced)
-        if residual_n <= self._rounding_n:
-            return True
-        options = self._options
-        step_m, residual = options.step_tolerance_m, options.residual_tolerance_n
-        if residual_n > residual or _resultant(reduced) > options.balance_tolerance_n:
-            return False
-        if moved_m <= step_m:
-            return True
-        if moved_m > NEAR * step_m or residual_n > residual / NEAR**2 or moved_m >= moved_before_m:
-            return False
-        return moved_m**2 <= step_m * (moved_before_m - moved_m)
+        return residual_n <= self._rounding_n or self._options.accept(
+            moved_before_m, moved_m, residual_n, _resultant(reduced)
+        )
 
     def _direction(self, reduced: Array) -> Array:
         direction = self._memory.direction(reduced, self._solver.solve)
@@ -342,4 +326,5 @@ class ImplicitEuler:
 
 def _resultant(reduced: Array) -> float:
     """Return the norm of the sum of forces, each node's three after each other."""
-    return float(np.linalg.norm(reduced.reshape(-1, 3).sum(axis=0)))
+    x, y, z = reduced.reshape(-1, 3).sum(axis=0).tolist()
+    return math.hypot(x, y, z)

@@ -1,5 +1,6 @@
 """The limited-memory BFGS update on top of a factored Hessian."""
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -44,7 +45,7 @@ class LbfgsMemory:
     def add(self, step: Array, change: Array) -> None:
         """Remember that `step` changed the gradient by `change`."""
         curvature = float(step @ change)
-        if curvature > MIN_CURVATURE * float(np.linalg.norm(step) * np.linalg.norm(change)):
+        if curvature > MIN_CURVATURE * math.sqrt(float(step @ step) * float(change @ change)):
             at = self._added % len(self._scales)
             self._steps[at], self._changes[at], self._scales[at] = step, change, 1.0 / curvature
             self._added += 1

@@ -7,6 +7,10 @@ from fras_sim.fem.element import CELL_OF, ElementKind
 from fras_sim.fem.errors import BadParameter
 from fras_sim.fem.materials import MaterialName, lame_parameters, material_module
 
+# A correction of so many tolerances is near the solution; so is the square of it for the residual,
+# which falls faster.
+NEAR = 5.0
+
 
 @dataclass(frozen=True)
 class TissueParameters:
@@ -119,3 +123,31 @@ class SolverOptions:
             value = getattr(self, name)
             if value < 1:
                 raise BadParameter(name, value, "1 or more")
+
+    def accept(
+        self, moved_before_m: float, moved_m: float, residual_n: float, resultant_n: float
+    ) -> bool:
+        """Whether a last full correction and the forces out of balance are small enough.
+
+        Parameters
+        ----------
+        moved_before_m, moved_m : float
+            What the last two corrections moved a node by at most.
+        residual_n, resultant_n : float
+            The largest force out of balance, and the norm of the sum of all.
+
+        Notes
+        -----
+        A sequence that contracts by a factor r has ``r / (1 - r)`` of its last correction left
+        (Hairer, Wanner, *Solving Ordinary Differential Equations II*, section IV.8). One quotient
+        may flatter: it is believed near the tolerance, and where the residual is small as well.
+        """
+        if residual_n > self.residual_tolerance_n or resultant_n > self.balance_tolerance_n:
+            return False
+        if moved_m <= self.step_tolerance_m:
+            return True
+        is_near = moved_m <= NEAR * self.step_tolerance_m
+        is_near &= residual_n <= self.residual_tolerance_n / NEAR**2
+        if not is_near or moved_m >= moved_before_m:
+            return False
+        return moved_m**2 <= self.step_tolerance_m * (moved_before_m - moved_m)

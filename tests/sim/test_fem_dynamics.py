@@ -1,0 +1,101 @@
+import numpy as np
+import pytest
+from threadpoolctl import threadpool_info
+
+from fras_sim.fem import SolverOptions, TissueParameters, TissueSimulator, ToolInput, box_mesh
+from fras_sim.fem.linear.blas_threads import one_blas_thread
+from fras_sim.fem.linear.multifrontal import MultifrontalCholesky
+
+OPTIONS = SolverOptions(step_tolerance_m=1e-6, residual_tolerance_n=1e-3, balance_tolerance_n=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("moved_before_m", "moved_m", "residual_n", "resultant_n", "accepted"),
+    [
+        (1e-3, 0.9e-6, 0.9e-3, 0.9e-3, True),
+        (1e-3, 0.9e-6, 1.1e-3, 0.0, False),  # a node is out of balance
+        (1e-3, 0.9e-6, 0.9e-3, 1.1e-3, False),  # little at each node, all to one side
+        (1e-3, 1.1e-6, 0.9e-3, 0.0, False),  # moved too far, and the force does not vouch for it
+        (1e-3, 4e-6, 1e-5, 0.0, True),  # contracts by 250: 0.016 um are left
+        (16e-6, 4e-6, 1e-5, 0.0, False),  # contracts by 4: 1.3 um are left
+        (21e-6, 4e-6, 1e-5, 0.0, True),  # contracts by 5.25: 0.94 um are left
+        (4e-6, 4e-6, 1e-5, 0.0, False),  # does not contract
+        (1e-3, 6e-6, 1e-5, 0.0, False),  # too far to believe a quotient
+    ],
+)
+def test_when_a_step_is_solved(moved_before_m, moved_m, residual_n, resultant_n, accepted):
+    assert OPTIONS.accept(moved_before_m, moved_m, residual_n, resultant_n) is accepted
+
+
+def jerked(monkeypatch, refactor_within=1000, newton_after=1000):
+    """Grasp, and lift by 1 mm at once: result, and how many factors that took."""
+    options = SolverOptions(refactor_within=refactor_within, newton_after=newton_after)
+    factors = []
+    factorize = MultifrontalCholesky.factorize
+
+    def counted(solver, values):
+        factors.append(1)
+        factorize(solver, values)
+
+    mesh = box_mesh(node_counts=(7, 9, 2))
+    fixed = mesh.bottom_nodes[:25]
+    tissue = TissueSimulator(mesh, TissueParameters(), fixed, options=options)
+    tip_m = mesh.nodes_m[-1]
+    tissue.step({"psm1": ToolInput(tip_m, 1.0)})
+    tissue.step({"psm1": ToolInput(tip_m, -0.3)})
+    monkeypatch.setattr(MultifrontalCholesky, "factorize", counted)
+    result = tissue.step({"psm1": ToolInput(tip_m + np.array([0.0, 0.0, 0.001]), -0.3)})
+    monkeypatch.undo()
+    assert result.solver.converged
+    return result, len(factors)
+
+
+def test_a_hard_step_falls_back_on_newton(monkeypatch):
+    """From the fourth correction on each has a factor of its own."""
+    lagged, one = jerked(monkeypatch)
+    newton, many = jerked(monkeypatch, newton_after=3)
+    assert lagged.solver.iterations > 5
+    assert one <= 1
+    assert many == newton.solver.iterations - 3 + one
+    np.testing.assert_allclose(newton.nodes_m, lagged.nodes_m, atol=3e-5)
+
+
+def test_a_step_renews_its_factor(monkeypatch):
+    lagged, one = jerked(monkeypatch)
+    renewed, factors = jerked(monkeypatch, refactor_within=2)
+    assert factors == renewed.solver.iterations // 2 + one
+    np.testing.assert_allclose(renewed.nodes_m, lagged.nodes_m, atol=3e-5)
+
+
+def test_an_easy_step_is_guessed_from_its_acceleration(monkeypatch):
+    """A steady pull is foreseen."""
+    mesh = box_mesh(node_counts=(11, 13, 2))
+    tip_m = mesh.nodes_m[-1]
+
+    def corrections():
+        tissue = TissueSimulator(mesh, TissueParameters(), mesh.bottom_nodes[:50])
+        tissue.step({"psm1": ToolInput(tip_m, 1.0)})
+        lifts_m = 4e-4 * np.arange(60)
+        results = [
+            tissue.step({"psm1": ToolInput(tip_m + np.array([0.0, 0.0, lift_m]), -0.3)})
+            for lift_m in lifts_m
+        ]
+        assert all(result.solver.converged for result in results)
+        return sum(result.solver.iterations for result in results)
+
+    foreseen = corrections()
+    monkeypatch.setattr("fras_sim.fem.dynamics.EASY", -1)
+    assert foreseen < corrections()
+
+
+def blas_threads():
+    return {(x["filepath"], x["num_threads"]) for x in threadpool_info() if x["user_api"] == "blas"}
+
+
+def test_blas_keeps_to_one_thread_and_gets_its_own_back():
+    before = blas_threads()
+    with one_blas_thread():
+        within = blas_threads()
+    assert within
+    assert {threads for _, threads in within} == {1}
+    assert blas_threads() == before
