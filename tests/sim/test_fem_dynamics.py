@@ -1,3 +1,5 @@
+import dataclasses
+
 import numpy as np
 import pytest
 from threadpoolctl import threadpool_info
@@ -86,6 +88,26 @@ def test_an_easy_step_is_guessed_from_its_acceleration(monkeypatch):
     foreseen = corrections()
     monkeypatch.setattr("fras_sim.fem.dynamics.EASY", -1)
     assert foreseen < corrections()
+
+
+@pytest.mark.parametrize("speed_m_s", [0.2, 0.4, 0.6])
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_a_shaken_body_is_not_guessed_to_burst(speed_m_s, seed):
+    """Collapsed elements snap at such speeds: their linear answer is a million times off."""
+    mesh = box_mesh(node_counts=(7, 9, 2))
+    tip_m = mesh.nodes_m[-1]
+    tissue = TissueSimulator(mesh, TissueParameters(), mesh.bottom_nodes[:25])
+    tissue.step({"psm1": ToolInput(tip_m, 1.0)})
+    for lift_m in 4e-4 * np.arange(5):
+        tissue.step({"psm1": ToolInput(tip_m + np.array([0.0, 0.0, lift_m]), -0.3)})
+    calm = tissue.checkpoint()
+    shaken = calm.velocity_m_s.copy()
+    rng = np.random.default_rng(seed)
+    shaken[70:-14] += rng.uniform(-speed_m_s, speed_m_s, shaken[70:-14].shape)
+    tissue.restore(dataclasses.replace(calm, velocity_m_s=shaken))
+    result = tissue.step({"psm1": ToolInput(tip_m + np.array([0.0, 0.0, 0.0018]), -0.3)})
+    assert result.solver.converged
+    assert result.solver.iterations <= 42
 
 
 def blas_threads():

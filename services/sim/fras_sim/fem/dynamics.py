@@ -152,9 +152,10 @@ class ImplicitEuler:
         Notes
         -----
         The first guess goes on at the old velocity, and after an easy step at the old acceleration
-        as well; where the held nodes don't, the others take the linear answer to the difference. A
-        matrix that can't be factored ends the step as not converged, as does a material that no
-        first guess keeps within its bounds.
+        as well; where the held nodes don't, the others take the linear answer to the difference. If
+        that doubles the energy, the answer is sought from where the body was, too. A matrix that
+        can't be factored ends the step as not converged, as does a material that no first guess
+        keeps within its bounds.
         """
         self._hold(held)
         problem = _Step(before, before.x + self._dt_s * before.v / self._drag)
@@ -162,11 +163,7 @@ class ImplicitEuler:
         try:
             if stale:
                 self._refactor(before.x, problem)
-            x = self._start(self._coasting(before), problem, held, held_at_m)
-            energy, gradient = self._energy(x, problem)
-            if not np.isfinite(energy):
-                x = self._start(before.x, problem, held, held_at_m)
-                energy, gradient = self._energy(x, problem)
+            x, energy, gradient = self._guess(problem, held, held_at_m)
             solution = self._minimise(x, energy, gradient, problem, refactored=stale)
         except FactorizationFailed:
             self.forget()
@@ -238,27 +235,44 @@ class ImplicitEuler:
         velocity = before.v if self._v_before is None else 2.0 * before.v - self._v_before
         return before.x + self._moves_on * self._dt_s * velocity
 
-    def _start(self, x: Array, problem: _Step, held: NDArray[np.int32], held_at_m: Array) -> Array:
-        """Return the first guess: `x`, with the linear answer to what the held nodes do."""
+    def _guess(
+        self, problem: _Step, held: NDArray[np.int32], held_at_m: Array
+    ) -> tuple[Array, float, Array]:
+        """Return the first guess, its energy and gradient."""
+        coasting = self._coasting(problem.before)
+        guess, before = self._lead(coasting, problem, held, held_at_m)
+        if guess[1] <= before + abs(before):
+            return guess
+        other, _ = self._lead(problem.before.x, problem, held, held_at_m)
+        return min(guess, other, key=lambda x: x[1] if np.isfinite(x[1]) else np.inf)
+
+    def _lead(
+        self, x: Array, problem: _Step, held: NDArray[np.int32], held_at_m: Array
+    ) -> tuple[tuple[Array, float, Array], float]:
+        """Lead the held nodes to where they must be, the others by the linear answer to it.
+
+        Returns
+        -------
+        tuple
+            The positions, their energy and its gradient; and the energy at `x`, infinite where
+            that was not asked for.
+        """
+        pattern = self._body.pattern
         lead = held_at_m - x[held]
+        energy = np.inf
         if np.abs(lead).max(initial=0.0) > LEAD_ROUNDING_M:
-            x = self._predict(x, problem, lead)
+            energy, gradient = self._energy(x, problem)
+            moved = np.zeros(pattern.n)
+            moved[self._held_rows] = lead.ravel()
+            pull = kernels.symmetric_product(pattern.indptr, pattern.indices, self._hessian, moved)
+            pull[self._held_rows] = 0.0
+            answer = self._solver.solve(-self._reduced(gradient) - pull)
+            answer[self._held_rows] = lead.ravel()
+            x = x + self._expanded(answer, x)
         else:
             x = x.copy()
         x[held] = held_at_m
-        return x
-
-    def _predict(self, x: Array, problem: _Step, lead: Array) -> Array:
-        """Lead the held nodes to where they must be, the others by the linear answer to it."""
-        pattern = self._body.pattern
-        moved = np.zeros(pattern.n)
-        moved[self._held_rows] = lead.ravel()
-        _, gradient = self._energy(x, problem)
-        pull = kernels.symmetric_product(pattern.indptr, pattern.indices, self._hessian, moved)
-        pull[self._held_rows] = 0.0
-        answer = self._solver.solve(-self._reduced(gradient) - pull)
-        answer[self._held_rows] = lead.ravel()
-        return x + self._expanded(answer, x)
+        return (x, *self._energy(x, problem)), energy
 
     def _minimise(
         self, x: Array, energy: float, gradient: Array, problem: _Step, *, refactored: bool
