@@ -174,6 +174,45 @@ def resume(
 
 
 @app.command()
+def plan(
+    contexts: Annotated[
+        Path, typer.Argument(help="A context as JSON, or a list of them; - for standard input.")
+    ],
+    criterion: Annotated[
+        str, typer.Option(help="sum, literal, lex, nearest or weighted, or one of your own.")
+    ] = "weighted",
+    goal: Annotated[
+        str, typer.Option(help="visible: the ROI is seen; clear: and no arm is at its limit.")
+    ] = "visible",
+    asp_dir: Annotated[
+        Path | None, typer.Option(help="Rules of your own, laid out like asp/.")
+    ] = None,
+    why_not: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Why not this block, or this action first? May be given more than once.",
+            metavar="'b(3,4)' or 'pull(psm1,b(3,4))'",
+        ),
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print the plans as JSON.")] = False,
+) -> None:
+    """Plan from a context, and explain the plan; no service needs to run."""
+    from fras_cli.plan import plan as plan_file
+
+    raise typer.Exit(
+        plan_file(
+            contexts,
+            criterion=criterion,
+            goal=goal,
+            asp_dir=asp_dir,
+            questions=why_not or [],
+            as_json=json,
+            console=Console(),
+        )
+    )
+
+
+@app.command()
 def report(
     log: Annotated[Path, typer.Argument(help="An audit log, or a run's folder.")],
     out: Annotated[

@@ -7,13 +7,14 @@ from fras_planner.planning.errors import (
     PlanningError,
     SceneChanged,
     SceneOutOfBounds,
+    UnknownAction,
     UnknownArm,
     UnknownBlock,
     UnknownCriterion,
     UnknownFluent,
     UnknownGoal,
 )
-from fras_planner.planning.plan import NoPlan, Plan, PlannedAction
+from fras_planner.planning.plan import NoPlan, Plan, PlannedAction, WhyNot
 from fras_planner.planning.program import Knowledge
 from fras_planner.planning.scene import Context, PlanningScene
 from fras_planner.planning.solver import Planner
@@ -32,9 +33,11 @@ __all__ = [
     "PlanningScene",
     "SceneChanged",
     "SceneOutOfBounds",
+    "UnknownAction",
     "UnknownArm",
     "UnknownBlock",
     "UnknownCriterion",
     "UnknownFluent",
     "UnknownGoal",
+    "WhyNot",
 ]

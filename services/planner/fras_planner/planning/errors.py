@@ -87,6 +87,22 @@ class UnknownFluent(PlanningError):
         )
 
 
+class UnknownAction(PlanningError):
+    """A question about something that is neither an action of `domain.lp` nor a block."""
+
+    action: str
+    known: tuple[str, ...]
+
+    def __init__(self, action: str, known: Iterable[str]) -> None:
+        forms = tuple(known)
+        super().__init__(
+            f"'{action}' is no action of the signature, nor a block b(i,j); "
+            f"actions: {', '.join(forms)}",
+            action=action,
+            known=forms,
+        )
+
+
 class UnknownBlock(PlanningError):
     """An atom about a block that the context does not have."""
 

@@ -10,7 +10,13 @@ from dataclasses import dataclass
 import clingo
 
 from fras_planner.planning.plan import PlannedAction
-from fras_planner.planning.program import TELL_FILES, Knowledge, Program
+from fras_planner.planning.program import (
+    TELL_FILES,
+    WHY_NOT_ACTION_FILES,
+    WHY_NOT_BLOCK_FILES,
+    Knowledge,
+    Program,
+)
 
 
 @dataclass(frozen=True)
@@ -65,8 +71,26 @@ def tell_no_plan(
     return _sentences(_told(knowledge, [*facts, *blamed], ("no_plan",)))
 
 
-def _told(knowledge: Knowledge, facts: Iterable[str], parts: Sequence[str]) -> Program:
-    program = Program(knowledge, TELL_FILES, ())
+def tell_why_not_block(
+    knowledge: Knowledge, preference: str, facts: Iterable[str]
+) -> tuple[str, ...]:
+    """Tell why a plan does not grasp the block asked about; `preference`: the criterion's file."""
+    files = (*WHY_NOT_BLOCK_FILES, preference)
+    return _sentences(_told(knowledge, facts, ("why_not_block",), files))
+
+
+def tell_why_not_action(knowledge: Knowledge, facts: Iterable[str]) -> tuple[str, ...]:
+    """Tell why a plan does not begin with the action asked about."""
+    return _sentences(_told(knowledge, facts, ("why_not_action",), WHY_NOT_ACTION_FILES))
+
+
+def _told(
+    knowledge: Knowledge,
+    facts: Iterable[str],
+    parts: Sequence[str],
+    files: Sequence[str] = TELL_FILES,
+) -> Program:
+    program = Program(knowledge, files, ())
     program.ground(*((part, ()) for part in ("base", *parts)), facts=facts)
     # Facts in, facts out: grounding has done all the work, no search is needed. The program is
     # handed on whole, because its atoms are gone with it.

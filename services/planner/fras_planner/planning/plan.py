@@ -83,3 +83,23 @@ class Plan:
     explanation: tuple[str, ...]
     no_plan: NoPlan | None = None
     optimal: bool = True
+
+
+@dataclass(frozen=True)
+class WhyNot:
+    """Why a plan does not do something.
+
+    Attributes
+    ----------
+    question : str
+        A block, or an action.
+    rules : tuple of str
+        Names of the rules that together forbid it; empty if it is possible, or if what it needs
+        is missing.
+    sentences : tuple of str
+        The answer in words.
+    """
+
+    question: str
+    rules: tuple[str, ...]
+    sentences: tuple[str, ...]

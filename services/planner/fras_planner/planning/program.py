@@ -12,6 +12,8 @@ from fras_planner.planning.signature import Alphabet
 
 PLAN_FILES = ("domain.lp", "target.lp", "actions.lp", "effects.lp", "constraints.lp", "goal.lp")
 TELL_FILES = ("history.lp", "explain.lp")
+WHY_NOT_BLOCK_FILES = ("explain.lp", "why_not_block.lp")
+WHY_NOT_ACTION_FILES = ("explain.lp", "why_not_action.lp")
 PREFERENCES = "preferences/"
 
 _PLACE = re.compile(r"<block>:(\d+):[^ ]*\s*(.*)", re.DOTALL)

@@ -40,6 +40,7 @@ class SceneFacts:
         self._known = alphabet.instances(STATIC, scene.names)
         self._alphabet = alphabet
         self.check(scene.statics)
+        self._statics = scene.statics
         self.statics = tuple(sorted(scene.statics))
         self.above_roi = tuple(atom for atom in self.statics if atom.startswith("above_roi("))
         self._fixed = frozenset(n for n in scene.names if f"fixed({n})" in scene.statics)
@@ -68,3 +69,8 @@ class SceneFacts:
             if name in self._fixed:
                 found.append(f"fixed({name})")
         return found
+
+    def reachable(self, name: str) -> list[str]:
+        """Say which arms reach a block."""
+        atoms = (f"reachable({arm},{name})" for arm in self._alphabet.arms)
+        return [atom for atom in atoms if atom in self._statics]

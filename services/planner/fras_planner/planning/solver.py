@@ -1,6 +1,7 @@
 """The planner: one long-lived clingo Control a scene, its state set anew for each plan."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Generator, Iterable
+from contextlib import contextmanager
 from typing import Any
 
 import clingo
@@ -11,9 +12,14 @@ from fras_planner.planning.errors import (
     SceneOutOfBounds,
     UnknownGoal,
 )
-from fras_planner.planning.narrator import tell_no_plan, tell_plan
+from fras_planner.planning.narrator import (
+    tell_no_plan,
+    tell_plan,
+    tell_why_not_action,
+    tell_why_not_block,
+)
 from fras_planner.planning.no_plan import minimal_core
-from fras_planner.planning.plan import NoPlan, Plan
+from fras_planner.planning.plan import NoPlan, Plan, WhyNot
 from fras_planner.planning.program import PLAN_FILES, Knowledge, Program
 from fras_planner.planning.scene import PlanningScene
 from fras_planner.planning.scene_facts import SceneFacts
@@ -24,6 +30,8 @@ GOALS = ("visible", "clear")
 HORIZON = 5
 MAX_HORIZON = 50
 CONFLICT_BUDGET = 200_000
+# Actions of the block chosen for the next grasp (`actions.lp`).
+NEEDS_TARGET = ("reach", "grasp")
 
 Sensed = dict[str, clingo.Symbol]
 
@@ -35,6 +43,7 @@ class _Best:
         self.atoms: list[clingo.Symbol] = []
         self.candidates = 0
         self.cost: tuple[int, ...] = ()
+        self.levels: tuple[int, ...] = ()
         self.models = 0
 
     def take(self, model: clingo.Model) -> None:
@@ -43,6 +52,7 @@ class _Best:
         self.atoms = [atom for atom in shown if atom.name != "candidate"]
         self.candidates = len(shown) - len(self.atoms)
         self.cost = tuple(model.cost)
+        self.levels = tuple(model.priority)
         self.models += 1
 
     def named(self, name: str) -> list[list[clingo.Symbol]]:
@@ -96,7 +106,7 @@ class Planner:
             raise UnknownGoal(goal, GOALS)
         if not 1 <= horizon <= MAX_HORIZON:
             raise SceneOutOfBounds("horizon", horizon, f"1 to {MAX_HORIZON} actions")
-        preference = knowledge.preference_file(criterion)
+        self._preference = knowledge.preference_file(criterion)
         self.scene = scene
         self.criterion = criterion
         self.goal = goal
@@ -105,7 +115,7 @@ class Planner:
         self._clock = clock
         self._sensed_now: Sensed = {}
         # The file itself tells whether it ranks by sums over all attachments, the costly measure.
-        sums = "attachment_distance_" in knowledge.files[preference]
+        sums = "attachment_distance_" in knowledge.files[self._preference]
         self._facts = SceneFacts(knowledge.alphabet, scene, sums=sums)
         options = [
             f"--const=goal={goal}",
@@ -115,7 +125,7 @@ class Planner:
             "--heuristic=Domain",
             "--opt-strategy=bb,lin",
         ]
-        program = Program(knowledge, [*PLAN_FILES, preference], options)
+        program = Program(knowledge, [*PLAN_FILES, self._preference], options)
         last = horizon + 1
         steps = [("step", (t,)) for t in range(1, last + 1)]
         parts = [("signature", ()), ("base", ()), *steps, ("check", (last,))]
@@ -188,6 +198,102 @@ class Planner:
             optimal=bool(result.exhausted),
         )
 
+    def why_not(
+        self,
+        question: str,
+        fluents: Iterable[str],
+        ignore_ap: bool = False,
+        tried: Iterable[str] = (),
+    ) -> WhyNot:
+        """Say why the plan for a context does not grasp a block, or does not begin with an action.
+
+        Parameters
+        ----------
+        question : str
+            A block `b(i,j)`, or an action as `domain.lp` declares it, `pull(psm1,b(3,2))`.
+        fluents, ignore_ap, tried
+            As for `plan`.
+
+        Returns
+        -------
+        WhyNot
+            What is missing for it; or the rules that forbid it; or by how much it is worse.
+
+        Raises
+        ------
+        UnknownAction, UnknownArm, UnknownBlock
+            If the question is about something that there is not.
+        UnknownFluent, ContradictoryFluents, SceneChanged
+            As for `plan`.
+        """
+        asked = normalised(question)
+        is_block = asked in self._facts.blocks
+        action = None if is_block else self._knowledge.alphabet.action(asked, self._facts.blocks)
+        plan = self.plan(fluents, ignore_ap, tried)
+        about = [asked, plan.target] if action is None else map(str, action.arguments)
+        facts = [
+            f"asked({asked})",
+            *self._facts.about(about),
+            *(
+                atom
+                for atom in self._facts.statics
+                if "reachable(" in atom and f",{asked})" in atom
+            ),
+            *self._facts.above_roi,
+            *self._sensed_now,
+            *(f"planned({done.text},{done.t})" for done in plan.actions),
+            *([f"target({plan.arm},{plan.target})"] if plan.target else []),
+            f"criterion({self.criterion})",
+            f"count(actions,{self._horizon})",
+        ]
+        if action is None:
+            told = tell_why_not_block(self._knowledge, self._preference, facts)
+            return WhyNot(asked, (), told)
+        rules, contrast = self._contrast(action, plan)
+        facts += [*contrast, *(f"core({rule})" for rule in rules)]
+        return WhyNot(asked, tuple(rules), tell_why_not_action(self._knowledge, facts))
+
+    def _contrast(self, action: clingo.Symbol, plan: Plan) -> tuple[list[str], list[str]]:
+        """Make the best plan that begins with an action.
+
+        Returns
+        -------
+        rules : list of str
+            That forbid it, together; empty if none does.
+        facts : list of str
+            `possible` if there is such a plan, and `worse(Level,By)` for the first level of
+            preference on which it falls short of the plan that was made.
+        """
+        arm, *blocks = action.arguments
+        wanted = [clingo.Function("occurs", [clingo.Function(action.name), arm, clingo.Number(1)])]
+        if action.name in NEEDS_TARGET:
+            wanted.append(clingo.Function("target", [arm, *blocks]))
+        atoms = [self._control.symbolic_atoms[symbol] for symbol in wanted]
+        given = [atom.literal for atom in atoms if atom is not None]
+        if len(given) < len(wanted):
+            return [], []
+        best = _Best()
+        self._control.solve([*given, *self._assumptions], on_model=best.take)
+        if best.models:
+            prices = zip(best.levels, best.cost, plan.cost or best.cost, strict=True)
+            worse = next(((level, by - of) for level, by, of in prices if by != of), None)
+            return [], ["possible", *([f"worse({worse[0]},{worse[1]})"] if worse else [])]
+        with self._any_model():
+            if self._control.solve(given).unsatisfiable:
+                return [], []
+            return minimal_core(self._control, self._rules, given), []
+
+    @contextmanager
+    def _any_model(self) -> Generator[None]:
+        """Look for any plan, not for the best."""
+        # The options' names are known at run time only.
+        solving: Any = self._control.configuration.solve
+        solving.opt_mode = "ignore"
+        try:
+            yield
+        finally:
+            solving.opt_mode = "opt"
+
     def _read(self, fluents: Iterable[str], ignore_ap: bool, tried: Iterable[str]) -> Sensed:
         """Check the atoms; those that may change, in alphabetical order."""
         alphabet = self._knowledge.alphabet
@@ -236,16 +342,11 @@ class Planner:
     def _why_none(self, sensed: Sensed, *, proved: bool) -> NoPlan:
         core = ["search_budget"]
         best = _Best()
-        # The options' names are known at run time only.
-        solving: Any = self._control.configuration.solve
-        solving.opt_mode = "ignore"
-        try:
+        with self._any_model():
             # Without any rule there is always a model; it tells contradictions and candidates.
             self._control.solve(on_model=best.take)
             self._check_contradictions(best, sensed)
             if proved:
                 core = minimal_core(self._control, self._rules)
-        finally:
-            solving.opt_mode = "opt"
         facts = [*self._facts.all, *sensed, *self._counts(best, self._horizon)]
         return NoPlan(tuple(core), tell_no_plan(self._knowledge, facts, core))
