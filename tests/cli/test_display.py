@@ -22,6 +22,7 @@ def task(phase: TaskPhase, action: str = "", goal_id: str = "") -> TaskStatus:
         actions=[],
         outcome="",
         reason="",
+        violations=[],
     )
 
 

@@ -163,6 +163,7 @@ def task_status(trial: str = "t-1") -> TaskStatus:
     return TaskStatus(
         trial=trial, phase="ended", action="", goal_id="", tried=[], plans=1, replans=0,
         scenario_kind="A", actions=[], outcome="success", reason="",
+        violations=[],
     )  # fmt: skip
 
 

@@ -161,6 +161,18 @@ def stop(
     raise typer.Exit(hold(cell, connect, reason, _console()))
 
 
+@app.command("why-not")
+def why_not(
+    question: Annotated[str, typer.Argument(help="A block, b(3,4), or an action, release(psm1).")],
+    cell: Cell = "local",
+    connect: Connect = None,
+) -> None:
+    """Ask a running planner why its latest plan is not another one."""
+    from fras_cli.keep import why_not
+
+    raise typer.Exit(why_not(question, cell, connect, _console()))
+
+
 @app.command()
 def resume(
     holder: Annotated[str, typer.Option(help="Whose hold to lift.")] = "cli",
@@ -253,6 +265,20 @@ def log_info(
     from fras_cli.log_info import print_info
 
     print_info(log / "audit.mcap" if log.is_dir() else log, _console())
+
+
+@log_app.command("verify")
+def log_verify(
+    log: Annotated[Path, typer.Argument(help="An audit log, or a run's folder.")],
+    asp_dir: Annotated[
+        Path | None, typer.Option(help="Specifications of your own, laid out like asp/.")
+    ] = None,
+) -> None:
+    """Hold what a trial did against the safety specifications."""
+    from fras_cli.log_verify import verify_log
+
+    path = log / "audit.mcap" if log.is_dir() else log
+    raise typer.Exit(verify_log(path, asp_dir, _console()))
 
 
 @scenario_app.command("new")

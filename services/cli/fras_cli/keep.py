@@ -1,4 +1,4 @@
-"""`fras up|down|status|stop|resume`: a stack that stays, and what one does to it."""
+"""`fras up|down|status|stop|resume|why-not`: a stack that stays, and what one does to it."""
 
 import signal
 import sys
@@ -7,6 +7,7 @@ from pathlib import Path
 
 import psutil
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from fras_cli import runtime
@@ -14,8 +15,15 @@ from fras_cli.link import Link
 from fras_cli.run import EXIT_OK, EXIT_STACK, caught_interrupts
 from fras_cli.stack import own_stack
 from fras_common.errors import FrasError
-from fras_common.messages import Health, HoldRequest, HoldState, ResumeRequest, TaskStatus
-from fras_common.topics import HEALTH, HOLD, RESUME, SERVICES, TASK_STATUS
+from fras_common.messages import (
+    Health,
+    HoldRequest,
+    HoldState,
+    ResumeRequest,
+    TaskStatus,
+    WhyNotRequest,
+)
+from fras_common.topics import HEALTH, HOLD, RESUME, SERVICES, TASK_STATUS, WHY_NOT
 from fras_supervisor import Console as Lines
 
 HOLDER = "cli"
@@ -142,6 +150,17 @@ def hold(cell: str, connect: str | None, reason: str, console: Console) -> int:
         took_ms = (time.monotonic() - began_s) * 1e3
     console.print(f"stop acknowledged at tick {state.tick} after {took_ms:.1f} ms")
     _print_holds(state, console)
+    return EXIT_OK
+
+
+def why_not(question: str, cell: str, connect: str | None, console: Console) -> int:
+    """Ask the planner why its latest plan is not another one."""
+    with Link(cell, endpoint(cell, connect), open_timeout_s=QUERY_TIMEOUT_S) as link:
+        request = WhyNotRequest(question=question)
+        answer = link.bus.query(WHY_NOT, request, QUERY_TIMEOUT_S)
+    console.print(f"Why not {escape(answer.question)} (trial {answer.trial})?", style="bold")
+    for sentence in answer.sentences:
+        console.print(escape(sentence))
     return EXIT_OK
 
 

@@ -115,6 +115,7 @@ TOPICS: tuple[Topic[Any], ...] = (
 )
 
 TASK = Query("planner/task", m.TaskRequest, m.TaskReply, "planner")
+WHY_NOT = Query("planner/why_not", m.WhyNotRequest, m.WhyNotReply, "planner")
 EXECUTE = Query("motion/execute", m.ExecuteRequest, m.ExecuteReply, "motion")
 CANCEL = Query("motion/cancel", m.CancelRequest, m.CancelReply, "motion")
 HOLD = Query("motion/hold", m.HoldRequest, m.HoldState, "motion")
@@ -129,6 +130,7 @@ RECORDER_CLOSE = Query("recorder/close", m.CloseRequest, m.CloseReply, "recorder
 
 QUERIES: tuple[Query[Any, Any], ...] = (
     TASK,
+    WHY_NOT,
     EXECUTE,
     CANCEL,
     HOLD,

@@ -1,11 +1,26 @@
 """Between messages and the planning core."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 
 from fras_common import messages as m
+from fras_common.errors import FrasError
 from fras_common.scenario import Scenario
 from fras_planner.executive import PlanRequest
-from fras_planner.planning import Context, Knowledge, Plan, Planner, PlanningScene
+from fras_planner.planning import (
+    Context,
+    Knowledge,
+    Plan,
+    Planner,
+    PlanningError,
+    PlanningScene,
+    verify,
+)
+
+NOTHING_PLANNED = "nothing has been planned yet: ask once a trial has its first plan"
+
+
+class NothingPlanned(FrasError):
+    """A question about a plan before there is one."""
 
 
 class PlanMaker:
@@ -27,6 +42,7 @@ class PlanMaker:
         self._section = scenario.planner
         self._planner: Planner | None = None
         self._scene: PlanningScene | None = None
+        self._latest: tuple[m.Context, PlanRequest] | None = None
 
     def __call__(self, context: m.Context, request: PlanRequest) -> m.Plan:
         """Plan from a context.
@@ -38,6 +54,7 @@ class PlanMaker:
             itself.
         """
         planner = self._planner_for(context)
+        self._latest = context, request
         plan = planner.plan(context.fluents, ignore_ap=request.ignore_ap, tried=request.tried)
         return m.Plan(
             tick=context.tick,
@@ -62,6 +79,28 @@ class PlanMaker:
             else None,
         )
 
+    def why_not(self, question: str) -> m.WhyNotReply:
+        """Say why the latest plan is not another one.
+
+        Raises
+        ------
+        NothingPlanned
+            If there is no plan yet.
+        PlanningError
+            If the question is about something that there is not.
+        """
+        if self._planner is None or self._latest is None:
+            raise NothingPlanned(NOTHING_PLANNED)
+        context, request = self._latest
+        answer = self._planner.why_not(question, context.fluents, request.ignore_ap, request.tried)
+        return m.WhyNotReply(
+            question=answer.question,
+            trial=context.trial,
+            request_id=context.request_id,
+            rules=list(answer.rules),
+            sentences=list(answer.sentences),
+        )
+
     def _planner_for(self, context: m.Context) -> Planner:
         scene = PlanningScene.from_context(
             Context(
@@ -83,6 +122,14 @@ class PlanMaker:
                 clock=self._clock,
             )
         return self._planner
+
+
+def verified(knowledge: Knowledge, history: Mapping[int, Iterable[str]]) -> list[str]:
+    """Say in words which safety specifications a history breaks."""
+    try:
+        return [violation.sentence for violation in verify(knowledge, history)]
+    except PlanningError as error:
+        return [f"the history could not be verified: {error}"]
 
 
 def _actions(plan: Plan) -> list[m.PlannedAction]:

@@ -52,6 +52,8 @@ RESET_TIMEOUT_S = 60.0
 CLOSE_TIMEOUT_S = 15.0
 
 MakePlan = Callable[[Context, "PlanRequest"], Plan]
+# Says which safety specifications a history breaks: for each step what held, and what was done.
+Verify = Callable[[dict[int, list[str]]], list[str]]
 Steps = Generator[Effect, Any, Any]
 
 
@@ -91,6 +93,14 @@ def reason_to_replan(ended: Ended) -> str:
     return ""
 
 
+def history_step(action: str, plan: Plan, before: Context) -> list[str]:
+    """Return what was sensed and asked for before an action, and the action."""
+    options = [f"tried({block})" for block in plan.tried]
+    if plan.ignore_ap:
+        options.append("ignore_ap")
+    return [action, *before.fluents, *options]
+
+
 class TaskAborted(FrasError):
     """Someone ended the trial; thrown into the executive at whatever it waits for."""
 
@@ -119,12 +129,18 @@ class Executive:
     scenario : Scenario
     make_plan : callable
         The planner core, on messages.
+    verify : callable
+        The verifier, on what was done.
     """
 
-    def __init__(self, request: TaskRequest, scenario: Scenario, make_plan: MakePlan) -> None:
+    def __init__(
+        self, request: TaskRequest, scenario: Scenario, make_plan: MakePlan, verify: Verify
+    ) -> None:
         self._request = request
         self._scenario = scenario
         self._make_plan = make_plan
+        self._verify = verify
+        self._done: dict[int, list[str]] = {}
         self._timeout_s = scenario.run.peer_timeout_s
         self._status = TaskStatus(
             trial=request.trial,
@@ -138,6 +154,7 @@ class Executive:
             actions=[],
             outcome="",
             reason="",
+            violations=[],
         )
         self._held: Held | None = None
         self._goals = 0
@@ -175,7 +192,12 @@ class Executive:
         failures: list[FrasError] = []
         yield from self._leave_motion(failures)
         seq = yield from self._say(
-            phase="ended", action="", goal_id="", outcome=outcome, reason=reason
+            phase="ended",
+            action="",
+            goal_id="",
+            outcome=outcome,
+            reason=reason,
+            violations=self._verify(self._done),
         )
         yield from self._close_log(seq, failures)
         yield from self._say(phase="idle")
@@ -254,7 +276,7 @@ class Executive:
             planned_with_ignore_ap, ignore_ap = ignore_ap, False
             reason = "exposure"
             for action in plan.actions:
-                ended: Ended = yield from self._act(action)
+                ended: Ended = yield from self._act(action, plan, context)
                 context = ended.context
                 self._remember(ended, planned_with_ignore_ap)
                 if deviation := reason_to_replan(ended):
@@ -301,7 +323,7 @@ class Executive:
         yield from self._say(replans=replans, scenario_kind=kind)
         return True
 
-    def _act(self, action: PlannedAction) -> Steps:
+    def _act(self, action: PlannedAction, plan: Plan, before: Context) -> Steps:
         arm, block = action.args[0], action.args[1] if len(action.args) > 1 else ""
         self._goals += 1
         goal_id = f"g{self._goals}"
@@ -320,6 +342,7 @@ class Executive:
         if not reply.accepted:
             context = yield from self._context()
             return Ended(action, None, reply.reason, context)
+        self._done[self._goals] = history_step(action.text, plan, before)
         result: ActionResult = yield AwaitResult(goal_id)
         self._last_tick = result.tick
         yield from self._say(actions=[*self._status.actions, action.text])

@@ -1,7 +1,7 @@
 """Planning from a file of contexts, without any service: what `fras plan` does."""
 
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +9,7 @@ import msgspec
 
 from fras_common.errors import FrasError
 from fras_planner.knowledge import load_knowledge
-from fras_planner.planning import Context, Knowledge, Plan, Planner, PlanningScene
+from fras_planner.planning import Context, Knowledge, Plan, Planner, PlanningScene, verify
 
 Vector = tuple[float, float, float]
 
@@ -163,3 +163,13 @@ def plain(plan: Plan) -> dict[str, Any]:
     """Return a plan as JSON has it."""
     row: dict[str, Any] = msgspec.to_builtins(plan, str_keys=True)
     return row
+
+
+def verify_history(history: Mapping[int, Iterable[str]], asp_dir: Path | None) -> list[str]:
+    """Say in words which safety specifications a history breaks.
+
+    Raises
+    ------
+    KnowledgeFault, UnknownFluent
+    """
+    return [violation.sentence for violation in verify(load_knowledge(asp_dir), history)]

@@ -1,13 +1,20 @@
 """The planner's shell: one trial at a time."""
 
 import time
+from functools import partial
 from pathlib import Path
 
 from fras_common.errors import FrasError
-from fras_common.messages import RecorderStatus, TaskReply, TaskRequest
+from fras_common.messages import (
+    RecorderStatus,
+    TaskReply,
+    TaskRequest,
+    WhyNotReply,
+    WhyNotRequest,
+)
 from fras_common.service import Deferred, ServiceHost
-from fras_common.topics import ACTION_RESULT, PLAN, RECORDER_STATUS, TASK, TASK_STATUS
-from fras_planner.adapter import PlanMaker
+from fras_common.topics import ACTION_RESULT, PLAN, RECORDER_STATUS, TASK, TASK_STATUS, WHY_NOT
+from fras_planner.adapter import NOTHING_PLANNED, NothingPlanned, PlanMaker, verified
 from fras_planner.executive import Executive, PeerLost, TaskAborted
 from fras_planner.knowledge import load_knowledge
 from fras_planner.performer import Performer
@@ -30,6 +37,7 @@ class PlannerService:
             on_end=self._on_end,
         )
         self._executive: Executive | None = None
+        self._plans: PlanMaker | None = None
         self._starter: Deferred[TaskRequest, TaskReply] | None = None
         self._peer_timeout_s = 0.0
         self._motion_gone_since_s: float | None = None
@@ -37,6 +45,7 @@ class PlannerService:
         host.subscribe(ACTION_RESULT, self._performer.deliver)
         host.subscribe(RECORDER_STATUS, self._on_recorder)
         host.serve_deferred(TASK, self._on_task)
+        host.serve(WHY_NOT, self._on_why_not)
 
     def _on_task(self, pending: Deferred[TaskRequest, TaskReply]) -> None:
         request = pending.request
@@ -52,7 +61,9 @@ class PlannerService:
             self._peer_timeout_s = scenario.run.peer_timeout_s
             self._starter = pending
             make_plan = PlanMaker(self._knowledge, scenario, time.perf_counter)
-            self._executive = Executive(request, scenario, make_plan)
+            self._plans = make_plan
+            verify = partial(verified, self._knowledge)
+            self._executive = Executive(request, scenario, make_plan, verify)
             self._host.enter_trial(request.trial)
             self._performer.start(self._executive.run())
 
@@ -65,6 +76,12 @@ class PlannerService:
             return
         pending.reply(TaskReply(accepted=True, reason=""))
         self._performer.drive(TaskAborted(pending.request.reason or "aborted on request"))
+
+    def _on_why_not(self, request: WhyNotRequest) -> WhyNotReply:
+        """Answer about the latest plan, of a trial that runs or has ended."""
+        if self._plans is None:
+            raise NothingPlanned(NOTHING_PLANNED)
+        return self._plans.why_not(request.question)
 
     def _on_recorder(self, status: RecorderStatus) -> None:
         """End the trial whose log can't be written any more: nothing moves unrecorded."""

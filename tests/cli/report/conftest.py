@@ -278,6 +278,7 @@ def plan(tick: int, reason: str, names: tuple[str, ...]) -> Plan:
 EMPTY_STATUS = TaskStatus(
     phase="resetting", action="", goal_id="", tried=[], plans=0, replans=0, scenario_kind="A",
     actions=[], outcome="", reason="",
+    violations=[],
 )  # fmt: skip
 
 

@@ -4,6 +4,7 @@ from fras_cli.report.errors import ForeignLog, NoSuchLog, NotAnMcap
 from fras_cli.report.reading import read_trial
 from fras_cli.report.summary import Percentiles, Summary, summarise, to_json
 from fras_cli.report.trial import Trial
+from fras_cli.report.wording import specifications_in_words
 from fras_cli.report.writing import write_picture, write_report
 
 __all__ = [
@@ -14,6 +15,7 @@ __all__ = [
     "Summary",
     "Trial",
     "read_trial",
+    "specifications_in_words",
     "summarise",
     "to_json",
     "write_picture",

@@ -19,6 +19,7 @@ from fras_common import topics
 from fras_common.codec import HeaderFields, MalformedMessage, decode, read_header
 from fras_common.messages import (
     ActionResult,
+    Context,
     Header,
     Health,
     LogRecord,
@@ -70,6 +71,7 @@ class Gathering:
         self._verdicts: dict[int, Verdict] = {}
         self._views: TissueViews | None = None
         self._top_m = -math.inf
+        self._contexts: list[Context] = []
         self._plans: list[Plan] = []
         self._statuses: list[TaskStatus] = []
         self._results: list[ActionResult] = []
@@ -77,6 +79,7 @@ class Gathering:
         self._warnings: list[str] = []
         self._handlers: dict[type[Any], Callable[[Any], None]] = {
             ActionResult: self._results.append,
+            Context: self._contexts.append,
             LogRecord: self._on_warning,
             Plan: self._plans.append,
             RobotState: self._on_robot,
@@ -118,6 +121,7 @@ class Gathering:
             tissue=_by_tick(self._tissue),
             verdicts=_by_tick(self._verdicts),
             views=self._views,
+            contexts=tuple(self._contexts),
             plans=tuple(self._plans),
             statuses=tuple(self._statuses),
             results=tuple(self._results),

@@ -25,6 +25,7 @@ from fras_cli.report.wording import (
     plan_reason,
     plan_title,
     reason_in_words,
+    specifications_in_words,
 )
 
 TEMPLATE = "template.html.j2"
@@ -119,6 +120,7 @@ def _numbers(trial: Trial, summary: Summary) -> list[tuple[str, str]]:
         ("Visibility", f"{_or(summary.visibility, '.1%')} (needed: more than {needed:.0%})"),
         ("Largest force", f"{_or(summary.max_force_n, '.3f', ' N')} (limit {summary.limit_n:g} N)"),
         ("Ticks above the limit", f"{summary.ticks_above_limit} of {summary.ticks}"),
+        ("Safety specifications", specifications_in_words(summary)),
         ("Plans", f"{summary.plans}, of them {summary.replans} re-plans"),
         ("Simulated time", f"{summary.sim_s:.2f} s"),
         ("Wall time", f"{summary.wall_s:.2f} s"),

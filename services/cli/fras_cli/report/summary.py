@@ -33,6 +33,8 @@ class Summary(msgspec.Struct, frozen=True, kw_only=True):
         Over the trial, by the scenario's metric [N].
     limit_n : float
         The soft limit [N].
+    violations : list of str or None
+        Safety specifications that what was done broke, in words; None if the trial has no end.
     ticks, sim_s : int, float
         Ticks simulated, and the same as simulated time [s].
     wall_s : float
@@ -61,6 +63,7 @@ class Summary(msgspec.Struct, frozen=True, kw_only=True):
     plans: int
     replans: int
     actions: list[str]
+    violations: list[str] | None
     ticks: int
     sim_s: float
     wall_s: float
@@ -95,6 +98,7 @@ def summarise(trial: Trial) -> Summary:
         plans=status.plans if status else 0,
         replans=status.replans if status else 0,
         actions=list(status.actions) if status else [],
+        violations=list(ending.violations) if ending else None,
         ticks=ticks,
         # Not 0.30000000000000004 in a file that people read.
         sim_s=round(ticks * trial.dt_s, 9),

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from fras_common.messages import (
     ActionResult,
+    Context,
     Plan,
     Pose,
     TaskStatus,
@@ -98,7 +99,7 @@ class Trial:
     robot, tissue, verdicts : tuple
         One entry a tick.
     views : TissueViews or None
-    plans, statuses, results : tuple
+    contexts, plans, statuses, results : tuple
     started_ns : int
         When `fras` was asked for this trial; 0 if the log does not say.
     first_ns, last_ns : int
@@ -120,6 +121,7 @@ class Trial:
     tissue: tuple[TissueTick, ...]
     verdicts: tuple[Verdict, ...]
     views: TissueViews | None
+    contexts: tuple[Context, ...]
     plans: tuple[Plan, ...]
     statuses: tuple[TaskStatus, ...]
     results: tuple[ActionResult, ...]

@@ -51,6 +51,13 @@ def details_in_words(summary: Summary, needed_fraction: float) -> list[str]:
     return sentences
 
 
+def specifications_in_words(summary: Summary) -> str:
+    """Whether what was done kept to the safety specifications."""
+    if summary.violations is None:
+        return "not checked: the trial has no end"
+    return "; ".join(summary.violations) or "all kept"
+
+
 def reason_in_words(reason: str) -> str:
     """Turn a reason of a plan, a result or an outcome into a clause; keep an unknown one."""
     if reason in _REASONS:

@@ -24,6 +24,8 @@ from fras_common.messages.planner import (
     TaskReply,
     TaskRequest,
     TaskStatus,
+    WhyNotReply,
+    WhyNotRequest,
 )
 from fras_common.messages.recorder import CloseReply, CloseRequest, OpenRequest, RecorderStatus
 from fras_common.messages.robot import ActionState, ArmState, RobotState
@@ -90,4 +92,6 @@ __all__ = [
     "TissueState",
     "Vec3",
     "Verdict",
+    "WhyNotReply",
+    "WhyNotRequest",
 ]

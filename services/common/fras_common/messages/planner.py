@@ -77,7 +77,8 @@ class TaskStatus(Header, frozen=True, kw_only=True):
     """The executive's whole memory; latched.
 
     A trial ends with phase `ended`; once its log is closed the phase is `idle`, and another one
-    may start.
+    may start. `violations` are the safety specifications (`asp/verify.lp`) that what was done
+    broke, in words; told at the end.
     """
 
     phase: TaskPhase
@@ -90,3 +91,20 @@ class TaskStatus(Header, frozen=True, kw_only=True):
     actions: list[str]
     outcome: Outcome
     reason: str
+    violations: list[str]
+
+
+class WhyNotRequest(Wire, frozen=True, kw_only=True):
+    """Ask why the latest plan does not grasp a block, or does not begin with an action."""
+
+    question: str
+
+
+class WhyNotReply(Wire, frozen=True, kw_only=True):
+    """The answer in words, and the rules that forbid it, if any do; for which plan it holds."""
+
+    question: str
+    trial: str
+    request_id: str
+    rules: list[str]
+    sentences: list[str]

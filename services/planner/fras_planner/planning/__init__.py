@@ -18,6 +18,7 @@ from fras_planner.planning.plan import NoPlan, Plan, PlannedAction, WhyNot
 from fras_planner.planning.program import Knowledge
 from fras_planner.planning.scene import Context, PlanningScene
 from fras_planner.planning.solver import Planner
+from fras_planner.planning.verifier import Violation, verify
 
 __all__ = [
     "Context",
@@ -39,5 +40,7 @@ __all__ = [
     "UnknownCriterion",
     "UnknownFluent",
     "UnknownGoal",
+    "Violation",
     "WhyNot",
+    "verify",
 ]

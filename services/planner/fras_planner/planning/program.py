@@ -14,6 +14,7 @@ PLAN_FILES = ("domain.lp", "target.lp", "actions.lp", "effects.lp", "constraints
 TELL_FILES = ("history.lp", "explain.lp")
 WHY_NOT_BLOCK_FILES = ("explain.lp", "why_not_block.lp")
 WHY_NOT_ACTION_FILES = ("explain.lp", "why_not_action.lp")
+VERIFY_FILES = ("verify.lp",)
 PREFERENCES = "preferences/"
 
 _PLACE = re.compile(r"<block>:(\d+):[^ ]*\s*(.*)", re.DOTALL)

@@ -1,0 +1,76 @@
+"""`fras log verify`: what a trial did against the safety specifications, from its log alone."""
+
+import importlib
+from pathlib import Path
+
+from rich.console import Console
+from rich.markup import escape
+
+from fras_cli.report import Trial, read_trial
+from fras_cli.run import EXIT_NOT_SUCCESS
+from fras_common.errors import FrasError
+from fras_common.messages import ActionResult, Context, Plan
+from fras_common.service.extras import require_extra
+
+
+class LogIncomplete(FrasError):
+    """A log that lacks what led to an action. Attributes: ``goal_id``."""
+
+
+def verify_log(path: Path, asp_dir: Path | None, console: Console) -> int:
+    """Print which specifications were broken; 0 if none was, else 1.
+
+    Raises
+    ------
+    LogIncomplete
+        If the context or the plan behind an action is not in the log.
+    """
+    with require_extra("planner"):
+        offline = importlib.import_module("fras_planner.offline")
+    trial = read_trial(path)
+    history = executed_history(trial)
+    broken: list[str] = offline.verify_history(history, asp_dir)
+    for sentence in broken:
+        console.print(escape(sentence))
+    said = trial.ending.violations if trial.ending is not None else None
+    if said is None:
+        console.print("The log ends before the trial did: what is in it was verified.")
+    elif list(said) != broken:
+        console.print(f"The planner itself said at the end: {escape(str(said))}")
+    verdict = f"{len(broken)} specifications broken" if broken else "all specifications kept"
+    console.print(f"{len(history)} actions verified: {verdict}.")
+    return EXIT_NOT_SUCCESS if broken or (said is not None and list(said) != broken) else 0
+
+
+def executed_history(trial: Trial) -> dict[int, list[str]]:
+    """Return for each action carried out what was sensed and asked for before it, and the action.
+
+    Action ``gK`` follows on context ``cK``: the executive asks for one before each, and numbers
+    both alike.
+    """
+    contexts = {context.request_id: context for context in trial.contexts}
+    history: dict[int, list[str]] = {}
+    for result in trial.results:
+        number = int(result.goal_id.removeprefix("g"))
+        before = contexts.get(f"c{number}")
+        plan = _plan_of(number, trial.plans)
+        if before is None or plan is None:
+            raise LogIncomplete(
+                f"{trial.path}: what led to action {result.goal_id} is not in the log",
+                goal_id=result.goal_id,
+            )
+        history[number] = _step(result, before, plan)
+    return history
+
+
+def _plan_of(number: int, plans: tuple[Plan, ...]) -> Plan | None:
+    made = [plan for plan in plans if int(plan.request_id.removeprefix("c")) <= number]
+    return made[-1] if made else None
+
+
+def _step(result: ActionResult, before: Context, plan: Plan) -> list[str]:
+    arguments = f"{result.arm},{result.block}" if result.block else result.arm
+    options = [f"tried({block})" for block in plan.tried]
+    if plan.ignore_ap:
+        options.append("ignore_ap")
+    return [f"{result.name}({arguments})", *before.fluents, *options]
