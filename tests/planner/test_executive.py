@@ -75,6 +75,7 @@ class World:
     requests: list[PlanRequest] = field(default_factory=list[PlanRequest])
     said: list[Plan | TaskStatus] = field(default_factory=list[Plan | TaskStatus])
     accepted: bool = False
+    verified: dict[int, list[str]] = field(default_factory=dict[int, list[str]])
     last: str = ""
     tick: int = 0
 
@@ -216,6 +217,24 @@ def test_a_trial_resets_in_order_and_closes_its_log() -> None:
     assert world.asked[:4] == ["recorder/open", "motion/reset", "sim/reset", "sa/reset"]
     assert world.asked[-2:] == ["motion/cancel", "recorder/close"]
     assert [request.reason for request in world.requests] == ["initial", "exposure"]
+
+
+def test_what_was_done_is_verified_with_what_was_known_before() -> None:
+    world = World(
+        [pulling(), RELEASING, []],
+        lambda text: [f"after({text})", f"at(psm1,{BLOCK})"],
+        planner=PlannerSection(ignore_ap=True),
+        ends={f"grasp(psm1,{BLOCK})": ("failed", "nothing_in_reach")},
+        refuse={f"reach(psm1,{OTHER})": "no way"},
+    )
+    end = world.run()
+    there = f"at(psm1,{BLOCK})"
+    assert list(world.verified.values()) == [
+        [f"reach(psm1,{BLOCK})", "after()", there, "ignore_ap"],
+        [f"grasp(psm1,{BLOCK})", f"after(reach(psm1,{BLOCK}))", there, "ignore_ap"],
+        ["release(psm1)", f"after(grasp(psm1,{BLOCK}))", there, f"tried({BLOCK})"],
+    ]  # and not what motion refused
+    assert end.violations == ["3 steps"]
 
 
 def test_soft_limit_leads_to_a_move_and_kind_b() -> None:

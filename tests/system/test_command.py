@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import socket
 from collections.abc import Callable
@@ -198,6 +199,12 @@ def test_up_status_stop_resume_run_down(fras: Fras, tmp_path: Path) -> None:
     assert many.end() == 0
     assert [json.loads(one)["seed"] for one in many.text.splitlines() if one[0] == "{"] == [1, 2]
     assert summary_of(tmp_path / "out" / "seed-2")["outcome"] == "success"
+    why_not = fras("why-not", "b(1,1)", "--cell", "here")
+    assert why_not.end() == 0
+    assert "Why not b(1,1)" in why_not.text
+    unknown = fras("why-not", "fly(psm1)", "--cell", "here")
+    assert unknown.end() == 1
+    assert "release(arm)" in unknown.text
     stop = fras("stop", "--cell", "here", "--reason", "look first")
     assert stop.end() == 0
     assert "held by cli: look first" in stop.text
@@ -257,6 +264,32 @@ def test_log_info_and_report_from_the_log_alone(fras: Fras, trials: Any, tmp_pat
     again = summary_of(tmp_path / "again")
     assert again["actions"] == summary.actions
     assert again["messages"] == summary.messages
+    verify = fras("log", "verify", str(log))
+    assert verify.end() == 0
+    assert "3 actions verified: all specifications kept" in verify.text
     missing = fras("log", "info", "nothing.mcap")
     assert missing.end() == 1
     assert "nothing.mcap" in missing.text
+
+
+def test_plan_from_a_file_of_contexts(fras: Fras, tmp_path: Path) -> None:
+    examples = Path(__file__).resolve().parents[2] / "examples" / "contexts.json"
+    plain = fras("plan", str(examples), "--why-not", "b(3,3)", "--criterion", "lex")
+    assert plain.end() == 0
+    assert "Timetable" in plain.text
+    assert plain.text.count("Why not b(3,3)?") == 3
+    as_json = fras("plan", str(examples), "--json")
+    assert as_json.end() == 0
+    rows = json.loads(as_json.text)
+    assert [row["actions"][0]["name"] for row in rows] == ["reach", "move", "release"]
+    (tmp_path / "bad.json").write_text('{"names": []}')
+    bad = fras("plan", "bad.json")
+    assert bad.end() == 2
+    assert "bad.json: Object missing required field `blocks_m`" in bad.text
+    rules = tmp_path / "rules"
+    shutil.copytree(examples.parents[1] / "asp", rules)
+    (rules / "goal.lp").write_text("#program check(t).\n:- query(t), not visible_roi(t.\n")
+    faulty = fras("plan", str(examples), "--asp-dir", "rules")
+    assert faulty.end() == 2
+    assert "rules/goal.lp:2: " in faulty.text
+    assert "syntax error" in faulty.text

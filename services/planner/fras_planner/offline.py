@@ -9,7 +9,7 @@ import msgspec
 
 from fras_common.errors import FrasError
 from fras_planner.knowledge import load_knowledge
-from fras_planner.planning import Context, Knowledge, Plan, Planner, PlanningScene, verify
+from fras_planner.planning import Context, Knowledge, Plan, Planner, PlanningScene, WhyNot, verify
 
 Vector = tuple[float, float, float]
 
@@ -103,9 +103,7 @@ class OfflinePlanner:
         planner = self._planner_for(context)
         given = (context.fluents, context.ignore_ap, context.tried)
         row = plain(planner.plan(*given))
-        row["why_not"] = [
-            msgspec.to_builtins(planner.why_not(question, *given)) for question in questions
-        ]
+        row["why_not"] = [plain(planner.why_not(question, *given)) for question in questions]
         return row
 
     def _planner_for(self, context: Context) -> Planner:
@@ -159,9 +157,9 @@ def plan_file(
     return rows, is_list
 
 
-def plain(plan: Plan) -> dict[str, Any]:
-    """Return a plan as JSON has it."""
-    row: dict[str, Any] = msgspec.to_builtins(plan, str_keys=True)
+def plain(result: Plan | WhyNot) -> dict[str, Any]:
+    """Return a result as JSON has it."""
+    row: dict[str, Any] = msgspec.json.decode(msgspec.json.encode(result))
     return row
 
 

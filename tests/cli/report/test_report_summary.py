@@ -13,8 +13,8 @@ from fras_cli.report.summary import CUT_SHORT
 
 FIELDS = {
     "outcome", "reason", "seed", "scenario_kind", "visibility", "max_force_n", "limit_n",
-    "ticks_above_limit", "plans", "replans", "actions", "ticks", "sim_s", "wall_s", "startup_s",
-    "tick_ms", "fe_ms", "messages", "lost", "log", "complete", "versions",
+    "ticks_above_limit", "plans", "replans", "actions", "violations", "ticks", "sim_s",
+    "wall_s", "startup_s", "tick_ms", "fe_ms", "messages", "lost", "log", "complete", "versions",
 }  # fmt: skip
 
 
@@ -94,7 +94,7 @@ def test_an_empty_log_says_null_not_zero(new_log: Callable[..., Any]) -> None:
     summary = json.loads(to_json(summarise(read_trial(log.file.path))))
     unknown = {name for name, value in summary.items() if value is None}
     assert unknown == {
-        "scenario_kind", "visibility", "max_force_n", "startup_s", "tick_ms", "fe_ms",
+        "scenario_kind", "visibility", "max_force_n", "startup_s", "tick_ms", "fe_ms", "violations",
     }  # fmt: skip
     assert summary["outcome"] == "aborted"
 

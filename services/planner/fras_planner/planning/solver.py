@@ -230,15 +230,11 @@ class Planner:
         is_block = asked in self._facts.blocks
         action = None if is_block else self._knowledge.alphabet.action(asked, self._facts.blocks)
         plan = self.plan(fluents, ignore_ap, tried)
-        about = [asked, plan.target] if action is None else map(str, action.arguments)
+        block = asked if action is None else str(action.arguments[-1])
         facts = [
             f"asked({asked})",
-            *self._facts.about(about),
-            *(
-                atom
-                for atom in self._facts.statics
-                if "reachable(" in atom and f",{asked})" in atom
-            ),
+            *self._facts.about([block, plan.target]),
+            *self._facts.reachable(block),
             *self._facts.above_roi,
             *self._sensed_now,
             *(f"planned({done.text},{done.t})" for done in plan.actions),

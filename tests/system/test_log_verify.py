@@ -1,0 +1,49 @@
+"""What real trials did, held against the safety specifications from their logs alone."""
+
+import dataclasses
+import io
+from typing import Any
+
+import msgspec
+import pytest
+from rich.console import Console
+
+from fras_cli.log_verify import LogIncomplete, executed_history, verify_log
+from fras_cli.report import read_trial
+
+
+@pytest.mark.parametrize("name", ["a", "b", "c"])
+def test_what_was_done_is_in_the_log_and_keeps_to_all(trials: Any, name: str) -> None:
+    summary, log = trials.run(name)
+    history = executed_history(read_trial(log))
+    assert [step[0] for step in history.values()] == summary.actions
+    assert summary.violations == []
+    assert verify_log(log, None, Console(file=io.StringIO())) == 0
+
+
+def test_an_action_that_breaks_one_is_told(trials: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same trial, had it grasped with its gripper closed."""
+    _, log = trials.run("a")
+    trial = read_trial(log)
+    contexts = list(trial.contexts)
+    arm = trial.results[1].arm
+    fluents = [*contexts[1].fluents, f"closed_gripper({arm})"]
+    contexts[1] = msgspec.structs.replace(contexts[1], fluents=fluents)
+    forged = dataclasses.replace(trial, contexts=tuple(contexts))
+    monkeypatch.setattr("fras_cli.log_verify.read_trial", lambda _: forged)
+    told = io.StringIO()
+    assert verify_log(log, None, Console(file=told, width=200)) == 1
+    text = told.getvalue()
+    assert "with its gripper closed" in text
+    assert "The planner itself said at the end: []" in text
+    assert "3 actions verified: 1 specifications broken." in text
+
+
+def test_a_log_without_what_led_to_an_action_is_named(
+    trials: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _, log = trials.run("a")
+    cut = dataclasses.replace(read_trial(log), contexts=())
+    monkeypatch.setattr("fras_cli.log_verify.read_trial", lambda _: cut)
+    with pytest.raises(LogIncomplete, match="what led to action g1"):
+        verify_log(log, None, Console(file=io.StringIO()))
