@@ -16,6 +16,7 @@ BENCHMARKS: dict[str, tuple[str, str]] = {
     "mesh": ("benchmarks.fe_mesh", "How much a finer mesh changes the force of a pull."),
     "stress": ("fras_sim.stress", "10,000 steps that try to break the tissue."),
     "planner": ("benchmarks.planner", "The planner against the paper's way with clingo, by grid."),
+    "criteria": ("benchmarks.criteria", "Where each criterion grasps, over 400 scenes."),
     "loop": ("benchmarks.loop", "A tick of all services against three raw Zenoh hops."),
 }
 
