@@ -8,9 +8,12 @@ import numpy as np
 import pytest
 
 from fras_planner.planning import Knowledge, Planner, PlanningScene
+from fras_planner.planning.program import TELL_FILES
 
 SceneMaker = Callable[..., PlanningScene]
 Block = tuple[int, int]
+# Random scenes by their number of blocks along a side: a thousand for each criterion.
+SCENES = {3: 600, 4: 200, 5: 60, 6: 40, 7: 30, 8: 25, 9: 25, 10: 20}
 CRITERIA = ("sum", "literal", "lex", "nearest", "weighted")
 
 
@@ -58,24 +61,30 @@ def brute_force(
     return min(candidates, key=worse) if candidates else None
 
 
+@pytest.fixture(scope="module")
+def wordless(knowledge: Knowledge) -> Knowledge:
+    """Knowledge that tells no story: to tell thousands of plans would take a third of the time."""
+    return Knowledge({**knowledge.files, **dict.fromkeys(TELL_FILES, "")}, "")
+
+
 @pytest.mark.parametrize("criterion", CRITERIA)
-@pytest.mark.parametrize("n", [3, 4, 5, 6, 7])
+@pytest.mark.parametrize("n", SCENES)
 def test_the_target_is_the_optimum(
-    knowledge: Knowledge, make_scene: SceneMaker, criterion: str, n: int
+    wordless: Knowledge, make_scene: SceneMaker, criterion: str, n: int
 ) -> None:
+    """All criteria judge the same scenes; what was tried and what is ignored is left to chance."""
     rng = np.random.default_rng([n, CRITERIA.index(criterion)])
-    for seed in range(12):
+    blocks = [(i, j) for i in range(1, n + 1) for j in range(1, n + 1)]
+    for seed in range(SCENES[n]):
         scene = make_scene(n, seed)
-        planner = Planner(knowledge, scene, criterion)
-        for share in (0.0, 0.3):
-            for ignore_ap in (False, True):
-                tried = {
-                    (i, j) for i in range(1, n + 1) for j in range(1, n + 1) if rng.random() < share
-                }
-                plan = planner.plan([], ignore_ap, [f"b({i},{j})" for i, j in sorted(tried)])
-                best = brute_force(scene, criterion, ignore_ap, tried)
-                wanted = "" if best is None else f"b({best[0]},{best[1]})"
-                assert plan.target == wanted, (seed, share, ignore_ap)
+        ignore_ap = bool(rng.random() < 0.25)
+        share = rng.choice([0.0, 0.3])
+        tried = {block for block in blocks if rng.random() < share}
+        planner = Planner(wordless, scene, criterion)
+        plan = planner.plan([], ignore_ap, [f"b({i},{j})" for i, j in sorted(tried)])
+        best = brute_force(scene, criterion, ignore_ap, tried)
+        wanted = "" if best is None else f"b({best[0]},{best[1]})"
+        assert plan.target == wanted, (seed, tried, ignore_ap)
 
 
 @pytest.mark.parametrize("criterion", CRITERIA)

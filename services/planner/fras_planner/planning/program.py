@@ -89,7 +89,7 @@ class Program:
         self._origin = knowledge.origin
         self._starts: list[tuple[int, str]] = []
         self._messages: list[str] = []
-        self.control = clingo.Control(list(arguments), logger=self._on_message)
+        self.control = clingo.Control(list(arguments), logger=_keeping(self._messages))
         lines = 0
         texts: list[str] = []
         for name in names:
@@ -137,5 +137,11 @@ class Program:
         words = " ".join(place.group(2).split())
         raise KnowledgeFault(f"{self._origin}/{name}", line - start, words)
 
-    def _on_message(self, _code: clingo.MessageCode, message: str) -> None:
-        self._messages.append(message)
+
+def _keeping(messages: list[str]) -> Callable[[clingo.MessageCode, str], None]:
+    """Return a logger; not a method, or a program could only be freed by the cycle collector."""
+
+    def log(_code: clingo.MessageCode, message: str) -> None:
+        messages.append(message)
+
+    return log
