@@ -6,26 +6,11 @@ import numpy as np
 import pytest
 
 from fras_planner.planning import Knowledge, Plan, Planner, PlanningScene
+from support.planning import random_state
 
 SceneMaker = Callable[..., PlanningScene]
 # Random states in all: 2 criteria, 2 goals, 20 scenes each, 25 states in each of them.
 SCENES, STATES = 20, 25
-
-
-def random_state(rng: np.random.Generator, names: tuple[str, ...]) -> list[str]:
-    state: list[str] = []
-    for arm in ("psm1", "psm2"):
-        where = [str(name) for name in rng.choice(names, size=int(rng.integers(0, 3)))]
-        closed = rng.random() < 0.5
-        state += [f"at({arm},{name})" for name in where]
-        if closed:
-            state.append(f"closed_gripper({arm})")
-            state += [f"in_hand({arm},{name})" for name in where]
-        if rng.random() < 0.3:
-            state.append(f"max_height({arm})")
-    if rng.random() < 0.15:
-        state.append("visible_roi")
-    return state
 
 
 def outcome(plan: Plan) -> tuple[object, ...]:

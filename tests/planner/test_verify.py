@@ -1,12 +1,20 @@
 """The safety specifications: each is broken by a history made for it, and by no plan."""
 
+import dataclasses
 from collections.abc import Callable
 
 import numpy as np
 import pytest
 
-from fras_planner.planning import Knowledge, Planner, PlanningScene, UnknownFluent, verify
-from planner.test_planner_warm import random_state
+from fras_planner.planning import (
+    Knowledge,
+    KnowledgeFault,
+    Planner,
+    PlanningScene,
+    UnknownFluent,
+    verify,
+)
+from support.planning import random_state
 
 SceneMaker = Callable[..., PlanningScene]
 
@@ -150,6 +158,14 @@ def test_violations_come_in_the_order_of_the_steps(knowledge: Knowledge) -> None
     far = ("reach(psm1,b(2,2))",)
     found = verify(knowledge, {30: far, 4: (*far, *SCENE), 200: far})
     assert [one.t for one in found] == [4, 30, 200]
+
+
+def test_a_specification_without_words_is_a_fault(knowledge: Knowledge) -> None:
+    text = knowledge.files["verify.lp"].replace("specification(pull_first,", "specification(pull,")
+    wordless = dataclasses.replace(knowledge, files={**knowledge.files, "verify.lp": text})
+    broken = history(SCENE, ("move(psm1,b(2,2))", *HELD))
+    with pytest.raises(KnowledgeFault, match=r"verify\.lp: violation\(pull_first"):
+        verify(wordless, broken)
 
 
 def test_an_atom_that_is_neither_fluent_nor_action_is_refused(knowledge: Knowledge) -> None:

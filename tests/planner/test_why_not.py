@@ -79,10 +79,7 @@ OPEN = "psm1 has its gripper open already, and is at no limit."
             "grasp(psm2, b(2,2))",
             [],
             (),
-            (
-                "grasp(psm2,b(2,2)) is action 2 of the plan: reach(psm2,b(2,2)) comes first.",
-                "psm2 is not at b(2,2).",
-            ),
+            ("grasp(psm2,b(2,2)) is action 2 of the plan: reach(psm2,b(2,2)) comes first.",),
         ),
         (
             "reach(psm1,b(2,1))",
@@ -110,6 +107,8 @@ OPEN = "psm1 has its gripper open already, and is at no limit."
             ("one_grasp_at_a_time",),
             ("Rule: Tissue in hand is let go before another piece is grasped.",),
         ),
+        ("grasp(psm1,b(2,1))", [], (), ("psm1 is not at b(2,1).",)),
+        ("grasp(psm1,b(2,2))", ["at(psm1,b(2,2))"], (), ("psm1 does not reach b(2,2).",)),
         ("pull(psm1,b(2,1))", [], (), ("psm1 holds no tissue.",)),
         ("pull(psm1,b(2,2))", HELD, (), ("psm1 does not hold b(2,2).",)),
         (
@@ -159,8 +158,7 @@ def test_what_was_tried_is_said(planner: Planner) -> None:
 def test_with_attachments_ignored_the_way_to_the_roi_counts(planner: Planner) -> None:
     answer = planner.why_not("b(1,1)", [], ignore_ap=True)
     assert answer.sentences[0] == (
-        "b(1,1) could be grasped, but falls short of b(1,2) by 31 under the way "
-        "'to_the_region_of_interest'."
+        "b(1,1) could be grasped, but is 31 mm farther from the region of interest than b(1,2)."
     )
     answer = planner.why_not("reach(psm2,b(2,2))", [], ignore_ap=True)
     assert answer.sentences == (
@@ -203,7 +201,7 @@ def test_the_other_arm_and_one_action_more(knowledge: Knowledge) -> None:
         "It is possible, but the other arm comes first where both serve.",
     )
     assert planner.why_not("release(psm1)", ["closed_gripper(psm1)"]).sentences == (
-        "It is possible, but takes 1 more actions.",
+        "It is possible, but lengthens the plan by 1.",
     )
 
 

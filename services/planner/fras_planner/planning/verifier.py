@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import clingo
 
+from fras_planner.planning.errors import KnowledgeFault
 from fras_planner.planning.program import VERIFY_FILES, Knowledge, Program
 from fras_planner.planning.signature import STATIC, functor, normalised
 
@@ -67,6 +68,11 @@ def verify(knowledge: Knowledge, history: Mapping[int, Iterable[str]]) -> tuple[
         str(atom.symbol.arguments[0]): atom.symbol.arguments[1].string
         for atom in atoms.by_signature("specification", 2)
     }
+    for atom in atoms.by_signature("violation", 3):
+        rule = str(atom.symbol.arguments[0])
+        if rule not in words:
+            problem = f"violation({rule},...) has no specification({rule},Text)"
+            raise KnowledgeFault(f"{knowledge.origin}/{VERIFY_FILES[0]}", 0, problem)
     found = [_violation(atom.symbol, words) for atom in atoms.by_signature("violation", 3)]
     return tuple(sorted(found, key=lambda one: (one.t, one.rule, one.sentence)))
 
