@@ -54,6 +54,8 @@ bench: $(VENV)/.installed-dev ## measure; figures belong into docs/benchmarks.md
 	$(BIN)/fras bench loop
 	$(BIN)/fras bench fe
 	$(BIN)/fras bench mesh
+	$(BIN)/fras bench planner
+	$(BIN)/fras bench criteria
 
 clean: ## remove what was built; runs/ stays
 	rm -rf $(VENV) build dist .pytest_cache .ruff_cache .import_linter_cache .hypothesis

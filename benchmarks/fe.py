@@ -15,7 +15,6 @@ import json
 import multiprocessing
 import os
 import platform
-import resource
 import time
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -23,6 +22,7 @@ from typing import Any
 
 import numpy as np
 from benchmarks.fe_figure import draw
+from benchmarks.memory import memory_mib
 
 DEFAULT_MESHES = ("11x13x2", "21x25x2", "21x25x3", "41x49x3")
 FRAS = ("auto", "scipy", "mkl")
@@ -71,11 +71,11 @@ def _measure(
         task = make_task(counts)
         if method in PEERS:
             measure = importlib.import_module(PEERS[method][1]).measure
-            before_kib = _peak_kib()
+            before_mib = memory_mib("VmHWM")
             measured = measure(task, budget_s)
         else:
             compile_kernels()
-            before_kib = _peak_kib()
+            before_mib = memory_mib("VmHWM")
             measured = measure_fras(task, method, budget_s)
     except Exception as error:  # noqa: BLE001 - a peer that fails is a line in the table
         sender.send(f"{type(error).__name__}: {error}")
@@ -86,14 +86,10 @@ def _measure(
             "cpu_ms": measured.cpu_ms,
             "phase_ms": measured.phase_ms,
             "notes": measured.notes,
-            "memory_mib": (_peak_kib() - before_kib) / 1024,
-            "process_mib": _peak_kib() / 1024,
+            "memory_mib": memory_mib("VmHWM") - before_mib,
+            "process_mib": memory_mib("VmHWM"),
         }
     )
-
-
-def _peak_kib() -> int:
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 
 def _mean_ms(raw: Raw, ticks: int | None = None) -> float:

@@ -19,7 +19,6 @@ import json
 import os
 import platform
 import re
-import resource
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -30,10 +29,11 @@ from typing import Any
 
 import numpy as np
 from benchmarks import planner_baseline as baseline
+from benchmarks.memory import memory_mib
 from benchmarks.planner_figure import CELLS, criteria_table, draw, main_table, targets
 
 from fras_planner.knowledge import load_knowledge
-from fras_planner.planning import Knowledge, Plan, Planner, PlanningScene
+from fras_planner.planning import Knowledge, Plan, Planner, PlanningScene, verify
 
 SIZES = (5, 6, 7, 8, 9, 10, 20, 40)
 CRITERIA = ("literal", "weighted")
@@ -49,6 +49,8 @@ MIXED_CALLS_LARGE = 60
 CELL_CALLS = 12
 REPLANS = 10_000
 SETTLE = 500
+REASONS = 120
+VERIFIED_STEPS = 10_000
 PATCHES = 3
 SIZE_M = (0.1, 0.12)
 Raw = dict[str, Any]
@@ -98,17 +100,6 @@ def first_state(cell: str, scene: PlanningScene, seed: int) -> State:
     return State([], []) if kind == "A" else make_state(kind, scene, np.random.default_rng(seed))
 
 
-def _memory_mib(field: str) -> float:
-    """VmRSS or VmHWM (the peak) of this process."""
-    try:
-        found = re.search(rf"{field}:\s+(\d+)", Path("/proc/self/status").read_text())
-    except OSError:
-        found = None
-    # Without /proc: a peak that may be the parent's, since a child starts with that.
-    kib = int(found[1]) if found else resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return kib / 1024
-
-
 # Jobs: each runs in a process of its own, and says when its budget starts.
 
 
@@ -117,13 +108,13 @@ def measure_baseline(ready: Ready, n: int, cell: str, seed: int, variant: str) -
     text = baseline.facts(scene)
     fluents = [*scene.statics, *first_state(cell, scene, seed).fluents]
     baseline.plan("block(b(1,1)).", ["visible_roi"], fresh=True)  # so that clingo is loaded
-    before_mib = _memory_mib("VmRSS")
+    before_mib = memory_mib("VmRSS")
     ready()
     began_s = time.perf_counter()
     plan = baseline.plan(text, fluents, fresh=variant == "fresh")
     spent_s = time.perf_counter() - began_s
-    memory_mib = _memory_mib("VmHWM") - before_mib
-    return {"s": spent_s, "actions": plan.actions, "score": plan.score, "mib": memory_mib}
+    grown_mib = memory_mib("VmHWM") - before_mib
+    return {"s": spent_s, "actions": plan.actions, "score": plan.score, "mib": grown_mib}
 
 
 def measure_planner(ready: Ready, n: int, criterion: str, repeats: int) -> Raw:
@@ -193,11 +184,11 @@ def measure_memory(ready: Ready, n: int, criterion: str) -> Raw:
     """How far a Planner and a few plans raise the process's peak."""
     knowledge, scene = load_knowledge(), make_scene(n, CELLS[-1], 0)
     ready()
-    before_mib = _memory_mib("VmRSS")
+    before_mib = memory_mib("VmRSS")
     planner, rng = Planner(knowledge, scene, criterion), np.random.default_rng(n)
     for number in range(12):
         _ask(planner, "ABC"[number % 3], rng)
-    return {"mib": _memory_mib("VmHWM") - before_mib}
+    return {"mib": memory_mib("VmHWM") - before_mib}
 
 
 def measure_flatness(ready: Ready, n: int, replans: int) -> Raw:
@@ -205,13 +196,13 @@ def measure_flatness(ready: Ready, n: int, replans: int) -> Raw:
     planner, rng = Planner(load_knowledge(), make_scene(n, CELLS[-1], 0)), np.random.default_rng(n)
     ready()
     spent_s: list[float] = []
-    memory_mib: list[float] = []
+    used_mib: list[float] = []
     for number in range(SETTLE + replans + 1):
         if number in (SETTLE, SETTLE + replans // 2, SETTLE + replans):
             gc.collect()  # what waits for the collector is no leak
-            memory_mib.append(_memory_mib("VmRSS"))
+            used_mib.append(memory_mib("VmRSS"))
         spent_s.append(_ask(planner, "ABC"[number % 3], rng)[0])
-    before_mib, halfway_mib, after_mib = memory_mib
+    before_mib, halfway_mib, after_mib = used_mib
     tenth = max(1, replans // 10)
     return {
         "n": n,
@@ -221,6 +212,40 @@ def measure_flatness(ready: Ready, n: int, replans: int) -> Raw:
         "last_half_mib": after_mib - halfway_mib,
         "first_p50_ms": _percentile_ms(spent_s[SETTLE : SETTLE + tenth], 50),
         "last_p50_ms": _percentile_ms(spent_s[-tenth:], 50),
+    }
+
+
+def measure_reasons(ready: Ready, n: int, steps: int) -> Raw:
+    """How long it takes to say why not, why there is no plan, and whether a history is sound."""
+    knowledge, scene = load_knowledge(), make_scene(n, CELLS[-1], 0)
+    planner, rng = Planner(knowledge, scene), np.random.default_rng(n)
+    ready()
+    why_not_s: list[float] = []
+    core_s: list[float] = []
+    for number in range(REASONS):
+        state = make_state("ABC"[number % 3], scene, rng)
+        block = str(rng.choice(scene.names))
+        actions = (f"reach(psm1,{block})", f"pull(psm1,{block})", "release(psm2)", block)
+        began_s = time.perf_counter()
+        planner.why_not(actions[number % 4], state.fluents, tried=state.tried)
+        why_not_s.append(time.perf_counter() - began_s)
+        began_s = time.perf_counter()
+        plan = planner.plan(state.fluents, tried=scene.names)
+        core_s.append(time.perf_counter() - began_s)
+        if number % 3 != 1 and plan.no_plan is None:
+            raise RuntimeError("a plan where every block was tried")
+    history = planner.plan([]).history
+    rounds = {t: history[1 + (t - 1) % len(history)] for t in range(1, steps + 1)}
+    began_s = time.perf_counter()
+    verify(knowledge, rounds)
+    return {
+        "n": n,
+        "why_not_p50_ms": _percentile_ms(why_not_s, 50),
+        "why_not_p99_ms": _percentile_ms(why_not_s, 99),
+        "core_p50_ms": _percentile_ms(core_s, 50),
+        "core_p99_ms": _percentile_ms(core_s, 99),
+        "verified_steps": steps,
+        "verify_ms": round(1e3 * (time.perf_counter() - began_s), 1),
     }
 
 
@@ -292,6 +317,8 @@ def planner_figures(n: int, criterion: str, repeats: int) -> tuple[Raw, Raw]:
         "warm_p50_ms": _percentile_ms(warm_s, 50),
         "warm_p99_ms": _percentile_ms(warm_s, 99),
         "warm_search_p50_ms": _percentile_ms([search_s for _, search_s in mixed], 50),
+        "warm_search_p99_ms": _percentile_ms([search_s for _, search_s in mixed], 99),
+        "told_p50_ms": _percentile_ms([whole_s - search_s for whole_s, search_s in mixed], 50),
         "warm_calls": len(mixed),
         "numpy_ms": _percentile_ms([run["numpy_s"] for run in runs], 50),
         "mib": round(memory["mib"], 1),
@@ -370,13 +397,21 @@ def main() -> None:
     result = measure(sorted(options.sizes), options.budget, options.repeats)
     watched = 7 if 7 in result else min(result)
     flat = _needed(measure_flatness, watched, options.replans)
-    reached = targets(result, flat, VARIANTS, CRITERIA)
+    asked = 10 if 10 in result else max(result)
+    reasons = _needed(measure_reasons, asked, VERIFIED_STEPS)
+    reached = targets(result, flat, reasons, VARIANTS, CRITERIA)
     print(main_table(result, VARIANTS, CRITERIA[0]))
     print(criteria_table(result, CRITERIA))
     print(
         f"memory at N = {flat['n']}: {flat['before_mib']:.1f} MiB, {flat['growth_mib']:+.2f} MiB "
         f"after {flat['replans']:,} more plans, {flat['last_half_mib']:+.2f} MiB in the last half; "
         f"p50 {flat['first_p50_ms']} ms in their first tenth, {flat['last_p50_ms']} ms in the last"
+    )
+    print(
+        f"at N = {asked}: why not {reasons['why_not_p50_ms']} ms "
+        f"(p99 {reasons['why_not_p99_ms']}), "
+        f"why no plan {reasons['core_p50_ms']} ms (p99 {reasons['core_p99_ms']}), "
+        f"{VERIFIED_STEPS:,} steps verified in {reasons['verify_ms']} ms"
     )
     for text, value, enough in reached:
         print(f"{'met' if enough else 'MISSED':8}{value:>14}  {text}")
@@ -388,6 +423,7 @@ def main() -> None:
         "compared_by": CRITERIA[0],
         "sizes": result,
         "memory_over_replans": flat,
+        "reasons": reasons,
         "growth_exponents": exponents,
         "targets": [{"what": t, "value": v, "met": enough} for t, v, enough in reached],
     }
