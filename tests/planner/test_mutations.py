@@ -19,7 +19,7 @@ Fingerprint = Callable[[Knowledge], Iterator[object]]
 
 KNOWLEDGE = load_knowledge()
 # These word what the other files decide, or judge it.
-WORDING = ("explain.lp", "why_not_block.lp", "why_not_action.lp")
+WORDING = ("explain.lp", "because.lp", "why_not_block.lp", "why_not_action.lp")
 JUDGING = ("verify.lp",)
 # Rules whose absence nothing shows, with the reason why they stay.
 EQUIVALENT: dict[str, str] = {
@@ -210,6 +210,23 @@ def answers(knowledge: Knowledge) -> Iterator[object]:
             yield outcome(planner.why_not, question, state.split())
 
 
+# Why a plan is made, as the executive says it.
+REASONS = ("initial", "exposure", "force", "hold", "nothing_in_reach", "deviation: x", "late")
+MEASURED = {
+    "visible_roi": {"visible_fraction": 0.5, "threshold_fraction": 0.7},
+    "max_height(psm1)": {"force_n": 0.4, "limit_n": 0.5},
+}
+
+
+def occasions(knowledge: Knowledge) -> Iterator[object]:
+    """What is said of a plan because of when and upon what numbers it is made."""
+    planner = Planner(knowledge, TISSUE)
+    for reason in REASONS:
+        for state in ("", f"{HELD} {LIMIT}"):
+            plan = planner.plan(state.split(), reason=reason, evidence=MEASURED)
+            yield plan.explanation
+
+
 def explained(knowledge: Knowledge) -> Iterator[object]:
     """All that is worded by `explain.lp`: plans, their absence, and the names of rules."""
     yield from fingerprint(knowledge)
@@ -278,7 +295,8 @@ def test_rule_of_planning(mutant: Mutant) -> None:
 
 @every(file for file in WORDING if file in KNOWLEDGE.files)
 def test_rule_of_wording(mutant: Mutant) -> None:
-    expect_death(explained if mutant.file == "explain.lp" else answers, mutant)
+    takes = {"explain.lp": explained, "because.lp": occasions}
+    expect_death(takes.get(mutant.file, answers), mutant)
 
 
 @every(file for file in JUDGING if file in KNOWLEDGE.files)

@@ -111,9 +111,12 @@ def test_what_is_no_context_is_refused_with_its_place(text: str, says: str) -> N
 
 
 def test_a_recorded_message_is_a_context() -> None:
-    recorded = {**CONTEXT, "tick": 3, "trial": "t", "evidence": {"visible_roi": {}}}
+    seen = {"visible_fraction": 0.25, "threshold_fraction": 0.7}
+    recorded = {**CONTEXT, "tick": 3, "trial": "t", "evidence": {"visible_roi": seen}}
     contexts, _ = read_contexts(json.dumps(recorded), "here.json")
     assert contexts[0].names == ("b(1,1)", "b(1,2)")
+    rows, _ = planned({**recorded, "reason": "exposure"})
+    assert rows[0]["explanation"][1].startswith("25.0 % of the tissue")
 
 
 def test_a_history_is_verified_in_words() -> None:

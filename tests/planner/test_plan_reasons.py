@@ -97,6 +97,51 @@ def test_tissue_that_cannot_be_moved_is_let_go(knowledge: Knowledge, scene: Plan
     assert plan.explanation[0] == ("psm1 lets go of b(2,1) so that the tissue can be grasped anew.")
 
 
+LIMITED = {
+    "visible_roi": {"visible_fraction": 0.412, "threshold_fraction": 0.7},
+    "max_height(psm1)": {"force_n": 0.4612, "limit_n": 0.5},
+    "reachable(psm1,b(2,1))": {"rest_y_m": 0.01},
+    "force": {"force_n": 0.4612},
+}
+
+
+def test_a_plan_made_anew_says_why_with_what_was_measured(planner: Planner) -> None:
+    state = ["in_hand(psm1,b(2,1))", "closed_gripper(psm1)", "max_height(psm1)"]
+    assert planner.plan(state, reason="force", evidence=LIMITED).explanation == (
+        "Planned anew: the force limit was crossed.",
+        "41.2 % of the tissue over the region of interest is lifted clear of it; more than 70.0 % "
+        "is needed.",
+        "psm1 may not pull higher: the limit of 0.50 N was crossed; now the tissue bears 0.46 N.",
+        "The tissue is moved sideways to b(1,2) because psm1 may not pull higher.",
+    )
+
+
+def test_a_first_plan_says_nothing_of_that(planner: Planner) -> None:
+    assert planner.plan([], evidence=LIMITED).explanation == planner.plan([]).explanation
+
+
+@pytest.mark.parametrize(
+    ("reason", "sentence"),
+    [
+        ("exposure", "Planned anew: all actions of the plan before are done."),
+        ("hold", "Planned anew: a person stopped the arms and let them go again."),
+        ("nothing_in_reach", "Planned anew: the jaw closed on nothing."),
+        ("slipped", "Planned anew: slipped."),
+        (
+            "deviation: in_hand(psm1,b(1,1)) expected after grasp(psm1,b(1,1))",
+            "Planned anew: deviation, in_hand(psm1,b(1,1)) expected after grasp(psm1,b(1,1)).",
+        ),
+        # Whatever a service says stands there as it was said, and is no rule.
+        (
+            'refused: "}). goal. a(\\"\n{} %',
+            'Planned anew: refused, "}). goal. a(\\"\n{} %.',
+        ),
+    ],
+)
+def test_why_anew(planner: Planner, reason: str, sentence: str) -> None:
+    assert planner.plan([], reason=reason).explanation[0] == sentence
+
+
 # --- no plan ----------------------------------------------------------------------------------
 
 

@@ -1,11 +1,14 @@
 """A planner that has planned before gives what a fresh one gives, in any state."""
 
+import gc
+import weakref
 from collections.abc import Callable
 
 import numpy as np
 import pytest
 
 from fras_planner.planning import Knowledge, Plan, Planner, PlanningScene
+from fras_planner.planning.program import Program
 from support.planning import random_state
 
 SceneMaker = Callable[..., PlanningScene]
@@ -67,3 +70,21 @@ def test_each_plan_leads_to_its_goal_by_its_own_history(
             after = plan.history[action.t + 1]
             for atom in action.expected:
                 assert (atom.lstrip("-") in after) != atom.startswith("-")
+
+
+def test_a_planner_is_freed_when_it_is_let_go(knowledge: Knowledge, make_scene: SceneMaker) -> None:
+    """By its last reference: what waits for the cycle collector costs memory and pauses."""
+    gc.collect()
+    gc.disable()
+    try:
+        planner = Planner(knowledge, make_scene(4, 1))
+        planner.plan([])
+        planner.why_not("b(1,1)", [])
+        planner.plan([], tried=planner.scene.names)
+        gone = weakref.ref(planner)
+        del planner
+        assert gone() is None
+        programs = [one for one in gc.get_objects() if isinstance(one, Program)]
+        assert programs == []
+    finally:
+        gc.enable()

@@ -55,7 +55,13 @@ class PlanMaker:
         """
         planner = self._planner_for(context)
         self._latest = context, request
-        plan = planner.plan(context.fluents, ignore_ap=request.ignore_ap, tried=request.tried)
+        plan = planner.plan(
+            context.fluents,
+            ignore_ap=request.ignore_ap,
+            tried=request.tried,
+            reason=request.reason,
+            evidence=context.evidence,
+        )
         return m.Plan(
             tick=context.tick,
             trial=context.trial,

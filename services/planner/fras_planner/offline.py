@@ -28,6 +28,8 @@ class ContextFile(msgspec.Struct, frozen=True, kw_only=True):
     fixed_points_m: list[Vector] = []
     ignore_ap: bool = False
     tried: list[str] = []
+    reason: str = "initial"
+    evidence: dict[str, dict[str, float]] = {}
 
 
 def read_contexts(text: bytes | str, place: str) -> tuple[list[Context], bool]:
@@ -58,7 +60,7 @@ def read_contexts(text: bytes | str, place: str) -> tuple[list[Context], bool]:
     except msgspec.MsgspecError as error:
         raise BadContext(
             f"{place}: {error}; a context has names, blocks_m, roi_m [m] and fluents, and may have "
-            "fixed_points_m, tried and ignore_ap",
+            "fixed_points_m, tried, ignore_ap, evidence and reason",
             place=place,
             problem=str(error),
         ) from error
@@ -71,6 +73,8 @@ def read_contexts(text: bytes | str, place: str) -> tuple[list[Context], bool]:
             fixed_points_m=tuple(file.fixed_points_m),
             ignore_ap=file.ignore_ap,
             tried=tuple(file.tried),
+            reason=file.reason,
+            evidence=file.evidence,
         )
         for file in files
     ]
@@ -102,7 +106,7 @@ class OfflinePlanner:
         """
         planner = self._planner_for(context)
         given = (context.fluents, context.ignore_ap, context.tried)
-        row = plain(planner.plan(*given))
+        row = plain(planner.plan(*given, reason=context.reason, evidence=context.evidence))
         row["why_not"] = [plain(planner.why_not(question, *given)) for question in questions]
         return row
 

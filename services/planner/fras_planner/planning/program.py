@@ -11,7 +11,7 @@ from fras_planner.planning.errors import KnowledgeFault, UnknownCriterion
 from fras_planner.planning.signature import Alphabet
 
 PLAN_FILES = ("domain.lp", "target.lp", "actions.lp", "effects.lp", "constraints.lp", "goal.lp")
-TELL_FILES = ("history.lp", "explain.lp")
+TELL_FILES = ("history.lp", "explain.lp", "because.lp")
 WHY_NOT_BLOCK_FILES = ("explain.lp", "why_not_block.lp")
 WHY_NOT_ACTION_FILES = ("explain.lp", "why_not_action.lp")
 VERIFY_FILES = ("verify.lp",)

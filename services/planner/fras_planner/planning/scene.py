@@ -1,7 +1,7 @@
 """What a plan is made for: the context as sensed, and the part of it that lasts."""
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 
 from fras_planner.planning.errors import EmptyContext
 from fras_planner.planning.program import Knowledge
@@ -34,6 +34,10 @@ class Context:
         Plan as if there were no attachments.
     tried : tuple of str
         Blocks that are no candidates any more.
+    reason : str
+        Why a plan is made now; only told.
+    evidence : mapping of str to mapping of str to float
+        The numbers behind each atom; only told.
     """
 
     names: tuple[str, ...]
@@ -43,6 +47,8 @@ class Context:
     fixed_points_m: tuple[Point, ...] = ()
     ignore_ap: bool = False
     tried: tuple[str, ...] = ()
+    reason: str = "initial"
+    evidence: Mapping[str, Mapping[str, float]] = field(default_factory=dict[str, dict[str, float]])
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """The planner: one long-lived clingo Control a scene, its state set anew for each plan."""
 
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Generator, Iterable, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -19,6 +19,7 @@ from fras_planner.planning.narrator import (
     tell_why_not_block,
 )
 from fras_planner.planning.no_plan import minimal_core
+from fras_planner.planning.occasion import occasion
 from fras_planner.planning.plan import NoPlan, Plan, WhyNot
 from fras_planner.planning.program import PLAN_FILES, Knowledge, Program
 from fras_planner.planning.scene import PlanningScene
@@ -34,6 +35,7 @@ CONFLICT_BUDGET = 200_000
 NEEDS_TARGET = ("reach", "grasp")
 
 Sensed = dict[str, clingo.Symbol]
+Evidence = Mapping[str, Mapping[str, float]]
 
 
 class _Best:
@@ -140,7 +142,13 @@ class Planner:
         self._ground_s = clock() - began
 
     def plan(
-        self, fluents: Iterable[str], ignore_ap: bool = False, tried: Iterable[str] = ()
+        self,
+        fluents: Iterable[str],
+        ignore_ap: bool = False,
+        tried: Iterable[str] = (),
+        *,
+        reason: str = "initial",
+        evidence: Evidence | None = None,
     ) -> Plan:
         """Make a plan.
 
@@ -153,6 +161,11 @@ class Planner:
             Plan as if there were no attachments.
         tried : iterable of str
             Blocks that are no candidates any more.
+        reason : str
+            Why a plan is made now, ``kind`` or ``kind: detail``; only told.
+        evidence : mapping of str to mapping of str to float, optional
+            The numbers behind each atom, their names ending in their unit (``_n``, ``_m``,
+            ``_fraction``); only told.
 
         Returns
         -------
@@ -181,7 +194,8 @@ class Planner:
             return Plan((), "", "", (), 0, ground_s, solve_s, {}, none.sentences, none, proved)
         self._check_contradictions(best, sensed)
         steps = 1 + len(best.named("occurs"))
-        story = tell_plan(self._knowledge, self._facts_about(best, sensed, steps), steps)
+        about = [*self._facts_about(best, sensed, steps), *occasion(reason, evidence or {})]
+        story = tell_plan(self._knowledge, about, steps)
         arm, target = story.actions[0].args[0] if story.actions else "", ""
         for row in best.named("target"):
             arm, target = str(row[0]), str(row[1])
