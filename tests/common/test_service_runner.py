@@ -5,15 +5,17 @@ import signal
 import subprocess
 import sys
 import threading
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from fras_common.bus.zenoh_bus import ZenohBus
+from fras_common.errors import FrasError
 from fras_common.messages import LogRecord
 from fras_common.service import ServiceHost, runner
 from fras_common.service.extras import MissingExtra, require_extra
-from fras_common.service.runner import parse_arguments, run_service, serve
+from fras_common.service.runner import CannotStart, parse_arguments, run_service, serve
 from fras_common.service.signals import StopFlag
 from fras_common.topics import LOG, VERDICT
 
@@ -134,6 +136,25 @@ def test_a_missing_library_is_named_with_its_extra(capsys: pytest.CaptureFixture
     said = capsys.readouterr().err
     assert "a_library_that_is_not_there" in said
     assert "fras[sim]" in said
+
+
+def test_a_folder_of_a_service_is_one_of_its_options(capsys: pytest.CaptureFixture[str]):
+    folders = {"own_rules": "rules of your own"}
+    options = parse_arguments("planner", ["--own-rules", "here"], "Plan.", folders)
+    assert options.own_rules == Path("here")
+    assert parse_arguments("planner", [], "Plan.", folders).own_rules is None
+    with pytest.raises(SystemExit):
+        parse_arguments("planner", ["--help"], "Plan.", folders)
+    assert "rules of your own" in capsys.readouterr().out
+
+
+def test_a_shell_that_can_not_be_made_says_why_and_leaves_nothing(bench: Any):
+    def build(host: ServiceHost) -> Recorded:
+        raise FrasError("rules.lp:3: syntax error")
+
+    with pytest.raises(CannotStart, match=r"rules\.lp:3: syntax error"):
+        serve(ServiceHost("sim"), bench.bus("sim/1"), build, StopFlag())
+    assert not any(thread.name == "health" for thread in threading.enumerate())
 
 
 def test_an_extra_that_is_there_is_no_matter():

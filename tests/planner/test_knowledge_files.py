@@ -78,6 +78,15 @@ def test_a_fault_is_told_with_file_and_line(copy: Path, file: str, rule: str, sa
     assert says in caught.value.message
 
 
+def test_what_a_file_leaves_open_is_its_own_fault(copy: Path) -> None:
+    path = copy / "target.lp"
+    with path.open("a") as out:
+        out.write("preference(\n")
+    with pytest.raises(KnowledgeFault, match="syntax error") as caught:
+        load_knowledge(copy)
+    assert (caught.value.file, caught.value.line) == (str(path), path.read_text().count("\n"))
+
+
 def test_a_missing_file_is_named(copy: Path, tmp_path: Path) -> None:
     (copy / "goal.lp").unlink()
     with pytest.raises(KnowledgeFault, match=r"goal\.lp: this file is missing"):

@@ -149,3 +149,11 @@ def test_missing_and_unreadable_files_are_named(tmp_path: Path) -> None:
 
 def test_start_order_of_the_local_stack_begins_with_the_router() -> None:
     assert start_order(load_table(find_table()).processes)[0] == "router"
+
+
+def test_a_process_can_be_given_arguments_as_they_stand():
+    table = parse_table('[process.one]\ncommand = ["{python}", "-m", "one"]\n', "here")
+    given = table.with_arguments("one", "--rules", "a {odd} name")
+    values = {"python": "py", "cell": "", "connect": "", "log_dir": "", "name": "one"}
+    assert expand(given.processes["one"], values) == ("py", "-m", "one", "--rules", "a {odd} name")
+    assert expand(table.processes["one"], values) == ("py", "-m", "one")

@@ -293,3 +293,20 @@ def test_plan_from_a_file_of_contexts(fras: Fras, tmp_path: Path) -> None:
     assert faulty.end() == 2
     assert "rules/goal.lp:2: " in faulty.text
     assert "syntax error" in faulty.text
+
+
+def test_a_trial_by_rules_of_ones_own(fras: Fras, tmp_path: Path) -> None:
+    """The criterion turned round: another block, and no Python touched."""
+    rules = tmp_path / "rules"
+    shutil.copytree(Path(__file__).resolve().parents[2] / "asp", rules)
+    usual = fras("run", "a", "--pace", "0", "--out", "usual")
+    assert usual.end() == 0
+    weighted = rules / "preferences" / "weighted.lp"
+    weighted.write_text(weighted.read_text().replace("2*Gap-Roi", "Roi-2*Gap"))
+    fras("run", "a", "--pace", "0", "--out", "other", "--asp-dir", "rules").end()
+    actions = [summary_of(tmp_path / name)["actions"] for name in ("usual", "other")]
+    assert actions[0][0] != actions[1][0]
+    (rules / "goal.lp").write_text("#program check(t).\nfoo(\n")
+    faulty = fras("run", "a", "--out", "faulty", "--asp-dir", "rules")
+    assert faulty.end() == 3
+    assert "rules/goal.lp:2: error: syntax error" in faulty.text

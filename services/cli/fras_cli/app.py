@@ -21,6 +21,7 @@ app.add_typer(log_app, name="log")
 app.add_typer(scenario_app, name="scenario")
 
 Cell = Annotated[str, typer.Option(help="Cell: stacks of different cells don't hear each other.")]
+AspDir = Annotated[Path | None, typer.Option(help="Rules of your own, laid out like asp/.")]
 Connect = Annotated[
     str | None, typer.Option(help="Endpoint of a router whose stack to use, tcp/HOST:PORT.")
 ]
@@ -81,6 +82,7 @@ def run(
     json: Annotated[
         bool, typer.Option("--json", help="Print the summary as JSON on standard output.")
     ] = False,
+    asp_dir: AspDir = None,
     cell: Cell = "local",
     connect: Connect = None,
     port: Annotated[
@@ -115,6 +117,7 @@ def run(
             port=port,
             console=_console(json),
             as_json=json,
+            asp_dir=asp_dir,
         )
     )
 
@@ -126,11 +129,13 @@ def up(
     logs: Annotated[
         Path | None, typer.Option(help="Folder of the logs.", show_default="runs/up-<cell>/logs")
     ] = None,
+    asp_dir: AspDir = None,
 ) -> None:
     """Start the stack and keep it, for `fras run` and for clients of your own."""
     from fras_cli.keep import up
 
-    raise typer.Exit(up(cell, port, logs or Path("runs") / f"up-{cell}" / "logs", _console()))
+    folder = logs or Path("runs") / f"up-{cell}" / "logs"
+    raise typer.Exit(up(cell, port, folder, _console(), asp_dir))
 
 
 @app.command()
@@ -196,9 +201,7 @@ def plan(
     goal: Annotated[
         str, typer.Option(help="visible: the ROI is seen; clear: and no arm is at its limit.")
     ] = "visible",
-    asp_dir: Annotated[
-        Path | None, typer.Option(help="Rules of your own, laid out like asp/.")
-    ] = None,
+    asp_dir: AspDir = None,
     why_not: Annotated[
         list[str] | None,
         typer.Option(

@@ -9,7 +9,7 @@ from fras_cli.run import (
     FolderInUse,
 )
 from fras_cli.runtime import BadCell, NoStack, StackExists
-from fras_cli.stack import StackIncomplete
+from fras_cli.stack import OtherRules, StackIncomplete
 from fras_cli.trial import StackDied, TrialRefused
 from fras_common.bus import NoAnswer
 from fras_common.bus.zenoh_bus import NoRouter
@@ -28,7 +28,7 @@ from fras_supervisor import (
     Unstoppable,
 )
 
-BAD_INPUT = (BadCell, BadEndpoint, FolderInUse, LogDirUnusable, ScenarioError)
+BAD_INPUT = (BadCell, BadEndpoint, FolderInUse, LogDirUnusable, OtherRules, ScenarioError)
 STACK_ERRORS = (
     CommandNotFound,
     DownTimeout,

@@ -37,7 +37,7 @@ class DownTimeout(FrasError):
     """The stack did not end in time."""
 
 
-def up(cell: str, port: int, log_dir: Path, console: Console) -> int:
+def up(cell: str, port: int, log_dir: Path, console: Console, asp_dir: Path | None = None) -> int:
     """Start a stack and keep it until Ctrl-C, `fras down`, or the death of a process."""
     connect = f"tcp/127.0.0.1:{port}"
     record = runtime.keep(cell, connect, log_dir)
@@ -49,7 +49,13 @@ def up(cell: str, port: int, log_dir: Path, console: Console) -> int:
                 return interrupts.count > 0
 
             started = own_stack(
-                cell, connect, log_dir, cancelled=stopping, echo=echo, tell=console.print
+                cell,
+                connect,
+                log_dir,
+                cancelled=stopping,
+                echo=echo,
+                tell=console.print,
+                asp_dir=asp_dir,
             )
             with started as stack:
                 console.print(

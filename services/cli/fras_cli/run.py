@@ -97,6 +97,7 @@ def run_trials(
     console: Console,
     as_json: bool,
     mesh: bytes = b"",
+    asp_dir: Path | None = None,
 ) -> int:
     """Run the scenarios one after the other through one stack.
 
@@ -114,6 +115,8 @@ def run_trials(
         Print the summaries to standard output, one JSON object a trial.
     mesh : bytes
         Content of the mesh file that the scenarios name.
+    asp_dir : Path, optional
+        Rules for the planner, other than those that came with FRAS.
 
     Returns
     -------
@@ -133,6 +136,7 @@ def run_trials(
             out / "logs",
             cancelled=lambda: interrupts.count > 0,
             tell=lambda words: console.print(words, style="dim"),
+            asp_dir=asp_dir,
         ) as stack,
     ):
         follower = TrialFollower(stack)

@@ -17,6 +17,10 @@ ABSENCE_S = 3.0
 PATIENCE_S = 3.0
 
 
+class OtherRules(FrasError):
+    """Rules were given for a stack that has its own. Attributes: ``cell``."""
+
+
 class StackIncomplete(FrasError):
     """A stack is there, but some of its services are not ready."""
 
@@ -86,6 +90,7 @@ def own_stack(
     cancelled: Callable[[], bool] = lambda: False,
     echo: Echo | None = None,
     tell: Callable[[str], None] | None = None,
+    asp_dir: Path | None = None,
 ) -> Generator[UsedStack]:
     """Start a stack, and stop it whatever happens.
 
@@ -101,10 +106,14 @@ def own_stack(
         Gets each line that a service logs.
     tell : callable, optional
         Gets who is waited for, in words, when the start takes long.
+    asp_dir : Path, optional
+        Rules for the planner other than those that came with FRAS.
     """
     started_ns = time.time_ns()
     endpoint = connect or f"tcp/127.0.0.1:{free_port()}"
     table = load_table(find_table("local"))
+    if asp_dir is not None:
+        table = table.with_arguments("planner", "--asp-dir", str(asp_dir.resolve()))
     with Link(cell, endpoint) as link:
         watched = told_when_slow(link, cancelled, tell) if tell else cancelled
         stack = Stack(table, cell, endpoint, log_dir, link.tokens, cancelled=watched, echo=echo)
@@ -166,6 +175,7 @@ def use_stack(
     log_dir: Path,
     cancelled: Callable[[], bool],
     tell: Callable[[str], None],
+    asp_dir: Path | None = None,
 ) -> Generator[UsedStack]:
     """Use the stack at `connect`, else the one that `fras up` keeps in `cell`, else an own one.
 
@@ -182,11 +192,24 @@ def use_stack(
         True ends the start of an own stack.
     tell : callable
         Gets which of them it is, in words.
+    asp_dir : Path, optional
+        Rules for the planner of an own stack.
+
+    Raises
+    ------
+    OtherRules
+        If there are rules for a stack that has started already.
     """
     runtime.record_path(cell)  # a name that can't be one is refused before anything starts
     if connect is not None:
         Endpoint.parse(connect)
     kept = runtime.find(cell) if connect is None and port is None else None
+    if asp_dir is not None and (connect is not None or kept is not None):
+        raise OtherRules(
+            f"the stack of cell {cell} has its rules already: leave out --asp-dir, or start it "
+            f"with `fras up --asp-dir {asp_dir}`",
+            cell=cell,
+        )
     if connect is not None:
         tell(f"using the stack of cell {cell} at {connect}")
         with running_stack(cell, connect, None) as used:
@@ -198,5 +221,5 @@ def use_stack(
     else:
         tell("starting the services")
         endpoint = f"tcp/127.0.0.1:{port}" if port is not None else None
-        with own_stack(cell, endpoint, log_dir, cancelled, tell=tell) as used:
+        with own_stack(cell, endpoint, log_dir, cancelled, tell=tell, asp_dir=asp_dir) as used:
             yield used

@@ -78,6 +78,13 @@ class Table(msgspec.Struct, frozen=True):
     source: str
     processes: dict[str, Process]
 
+    def with_arguments(self, name: str, *arguments: str) -> "Table":
+        """Return the same table with a process that takes some arguments more, as they stand."""
+        process = self.processes[name]
+        literal = tuple(word.replace("{", "{{").replace("}", "}}") for word in arguments)
+        changed = msgspec.structs.replace(process, command=(*process.command, *literal))
+        return Table(self.source, {**self.processes, name: changed})
+
 
 def find_table(name: str = "local") -> Path:
     """Path of `compose/<name>.toml`: in the installed package, else in the checkout."""

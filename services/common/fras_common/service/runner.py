@@ -6,17 +6,24 @@ import importlib
 import sys
 import threading
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from functools import partial
+from pathlib import Path
 from typing import Protocol
 
 from fras_common.bus import Bus
 from fras_common.bus.zenoh_bus import NoRouter, ZenohBus
+from fras_common.errors import FrasError
 from fras_common.service.extras import MissingExtra, require_extra
 from fras_common.service.host import ServiceHost
 from fras_common.service.logs import configure_logging
 from fras_common.service.signals import StopFlag
 
 EXIT_START = 3
+
+
+class CannotStart(FrasError):
+    """A shell that can't be made of what it was given."""
 
 
 class Service(Protocol):
@@ -31,11 +38,16 @@ class Service(Protocol):
         ...
 
 
-Build = Callable[[ServiceHost], Service]
+Build = Callable[..., Service]
 
 
-def parse_arguments(name: str, argv: list[str] | None, description: str) -> argparse.Namespace:
-    """Arguments that every service takes."""
+def parse_arguments(
+    name: str,
+    argv: list[str] | None,
+    description: str,
+    folders: Mapping[str, str] | None = None,
+) -> argparse.Namespace:
+    """Arguments that every service takes, and the folders that this one does."""
     parser = argparse.ArgumentParser(prog=f"fras {name}", description=description)
     parser.add_argument("--cell", default="local", help="cell (Zenoh namespace fras/<cell>)")
     parser.add_argument(
@@ -45,10 +57,19 @@ def parse_arguments(name: str, argv: list[str] | None, description: str) -> argp
     parser.add_argument(
         "--log-level", default="INFO", choices=["DEBUG", "INFO", "WARNING", "ERROR"]
     )
+    for folder, help_text in (folders or {}).items():
+        flag = "--" + folder.replace("_", "-")
+        parser.add_argument(flag, dest=folder, type=Path, metavar="DIR", help=help_text)
     return parser.parse_args(argv)
 
 
-def run_service(name: str, shell: str, argv: list[str] | None = None, description: str = "") -> int:
+def run_service(
+    name: str,
+    shell: str,
+    argv: list[str] | None = None,
+    description: str = "",
+    folders: Mapping[str, str] | None = None,
+) -> int:
     """Run a service until it is told to stop.
 
     Parameters
@@ -62,13 +83,18 @@ def run_service(name: str, shell: str, argv: list[str] | None = None, descriptio
         Command line without the program's name.
     description : str
         First line of `--help`.
+    folders : mapping of str to str, optional
+        Names of folders that the shell takes, as keywords, with their help.
 
     Returns
     -------
     int
-        Exit status: 0 after a stop, 3 if a library is missing or the router can't be reached.
+        Exit status: 0 after a stop, 3 if a library is missing, the router can't be reached or the
+        shell can't be made of what it was given.
     """
-    options = parse_arguments(name, argv, description)
+    folders = folders or {}
+    options = parse_arguments(name, argv, description, folders)
+    given = {folder: getattr(options, folder) for folder in folders}
     stop = StopFlag()
     stop.install()
     host = ServiceHost(name)
@@ -88,7 +114,10 @@ def run_service(name: str, shell: str, argv: list[str] | None = None, descriptio
         print(f"fras {name}: {error}", file=sys.stderr)
         return EXIT_START
     try:
-        serve(host, bus, build, stop)
+        serve(host, bus, partial(build, **given), stop)
+    except CannotStart as error:
+        print(f"fras {name}: {error}", file=sys.stderr)
+        return EXIT_START
     finally:
         bus.close()
     return 0
@@ -102,7 +131,10 @@ def _load(shell: str) -> Build:
 def serve(host: ServiceHost, bus: Bus, build: Build, stop: StopFlag) -> None:
     """Attach, announce, and loop until `stop`."""
     host.attach(bus)
-    service = build(host)
+    try:
+        service = build(host)
+    except FrasError as error:
+        raise CannotStart(str(error)) from error
     health_stop = threading.Event()
     health = threading.Thread(
         target=host.report_health, args=(health_stop,), name="health", daemon=True

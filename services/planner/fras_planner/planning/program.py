@@ -95,7 +95,7 @@ class Program:
         for name in names:
             if name not in knowledge.files:
                 raise KnowledgeFault(f"{knowledge.origin}/{name}", 0, "this file is missing")
-            text = f"#program base.\n{knowledge.files[name]}\n"
+            text = f"#program base.\n{knowledge.files[name].rstrip()}\n"
             # One block for all files: clingo names blocks alike, but counts lines through.
             self._starts.append((lines + 1, name))
             texts.append(text)
@@ -132,7 +132,11 @@ class Program:
         if place is None:
             raise KnowledgeFault(self._origin, 0, message.strip())
         line = int(place.group(1))
-        start, name = max(entry for entry in self._starts if entry[0] <= line)
+        started = [entry for entry in sorted(self._starts) if entry[0] <= line]
+        start, name = started[-1]
+        if line == start and len(started) > 1:
+            # What is open at the end of a file is noticed at the line put before the next one.
+            line, (start, name) = line - 1, started[-2]
         # The first line of each file's text is the `#program base.` put before it.
         words = " ".join(place.group(2).split())
         raise KnowledgeFault(f"{self._origin}/{name}", line - start, words)
