@@ -120,6 +120,17 @@ def test_a_first_plan_says_nothing_of_that(planner: Planner) -> None:
     assert planner.plan([], evidence=LIMITED).explanation == planner.plan([]).explanation
 
 
+def test_evidence_of_what_was_not_sensed_is_not_told(planner: Planner) -> None:
+    odd = {
+        "max_height(psm2": {"limit_n": 0.5, "force_n": 0.4},
+        "visible_roi. occurs(release,psm1,1)": {"visible_fraction": 1.0},
+        "max_height(psm2)": {"limit_n": 0.5, "force_n": 0.4},
+        "visible_roi": {"visible_fraction": float("nan"), "threshold_fraction": 0.7},
+    }
+    plain = planner.plan([], reason="exposure")
+    assert planner.plan([], reason="exposure", evidence=odd).explanation == plain.explanation
+
+
 @pytest.mark.parametrize(
     ("reason", "sentence"),
     [
@@ -133,8 +144,8 @@ def test_a_first_plan_says_nothing_of_that(planner: Planner) -> None:
         ),
         # Whatever a service says stands there as it was said, and is no rule.
         (
-            'refused: "}). goal. a(\\"\n{} %',
-            'Planned anew: refused, "}). goal. a(\\"\n{} %.',
+            'refused: "}). goal. a(\\"\n\0{} %',
+            'Planned anew: refused, "}). goal. a(\\"  {} %.',
         ),
     ],
 )

@@ -1,22 +1,33 @@
 """What a plan is made for, as facts: the reason, and the numbers behind what was sensed."""
 
-from collections.abc import Mapping
+import math
+from collections.abc import Container, Mapping
 
-from fras_planner.planning.signature import functor
+Evidence = Mapping[str, Mapping[str, float]]
+# Its numbers are told whether it holds or not.
+GOAL = "visible_roi"
 
-# Fluents whose numbers `because.lp` tells.
-TOLD = ("visible_roi", "max_height")
 
+def occasion(reason: str, evidence: Evidence, sensed: Container[str]) -> list[str]:
+    """Return ``reason(Kind,Detail)`` and ``evidence(Atom,Name,Text)``; texts are strings.
 
-def occasion(reason: str, evidence: Mapping[str, Mapping[str, float]]) -> list[str]:
-    """Return ``reason(Kind,Detail)`` and ``evidence(Atom,Name,Text)``; texts are strings."""
+    Parameters
+    ----------
+    reason : str
+        ``kind`` or ``kind: detail``.
+    evidence : mapping of str to mapping of str to float
+        Of atoms that are not `sensed`, nothing is told.
+    sensed : container of str
+        Checked atoms: no other text becomes part of the program.
+    """
     kind, _, detail = reason.partition(":")
     facts = [f"reason({_quoted(kind.strip())},{_quoted(detail.strip())})"]
     for atom, numbers in evidence.items():
-        if functor(atom) in TOLD:
+        if atom == GOAL or atom in sensed:
             facts += [
                 f"evidence({atom},{_quoted(name)},{_quoted(spoken(name, value))})"
                 for name, value in numbers.items()
+                if math.isfinite(value)
             ]
     return facts
 
@@ -33,5 +44,6 @@ def spoken(name: str, value: float) -> str:
 
 
 def _quoted(text: str) -> str:
-    escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
+    printable = "".join(letter if letter.isprintable() else " " for letter in text)
+    escaped = printable.replace("\\", "\\\\").replace('"', '\\"')
     return f'"{escaped}"'

@@ -1,6 +1,6 @@
 """The planner: one long-lived clingo Control a scene, its state set anew for each plan."""
 
-from collections.abc import Callable, Generator, Iterable, Mapping
+from collections.abc import Callable, Generator, Iterable
 from contextlib import contextmanager
 from typing import Any
 
@@ -19,7 +19,7 @@ from fras_planner.planning.narrator import (
     tell_why_not_block,
 )
 from fras_planner.planning.no_plan import minimal_core
-from fras_planner.planning.occasion import occasion
+from fras_planner.planning.occasion import Evidence, occasion
 from fras_planner.planning.plan import NoPlan, Plan, WhyNot
 from fras_planner.planning.program import PLAN_FILES, Knowledge, Program
 from fras_planner.planning.scene import PlanningScene
@@ -35,7 +35,6 @@ CONFLICT_BUDGET = 200_000
 NEEDS_TARGET = ("reach", "grasp")
 
 Sensed = dict[str, clingo.Symbol]
-Evidence = Mapping[str, Mapping[str, float]]
 
 
 class _Best:
@@ -194,7 +193,7 @@ class Planner:
             return Plan((), "", "", (), 0, ground_s, solve_s, {}, none.sentences, none, proved)
         self._check_contradictions(best, sensed)
         steps = 1 + len(best.named("occurs"))
-        about = [*self._facts_about(best, sensed, steps), *occasion(reason, evidence or {})]
+        about = [*self._facts_about(best, sensed, steps), *occasion(reason, evidence or {}, sensed)]
         story = tell_plan(self._knowledge, about, steps)
         arm, target = story.actions[0].args[0] if story.actions else "", ""
         for row in best.named("target"):
