@@ -42,3 +42,14 @@ def make_scene() -> SceneMaker:
         return PlanningScene.make(names, blocks, [*roi, 0.0], statics)
 
     return make
+
+
+@pytest.fixture(scope="session")
+def four_blocks() -> PlanningScene:
+    """Four blocks 40 mm apart, the ROI 10 mm beside (1,2), an attachment under (1,1)."""
+    names = ["b(1,1)", "b(1,2)", "b(2,1)", "b(2,2)"]
+    blocks = [(0.0, 0.0, 0.0), (0.0, 0.04, 0.0), (0.04, 0.0, 0.0), (0.04, 0.04, 0.0)]
+    statics = ["fixed(b(1,1))", "above_roi(b(1,2))"]
+    statics += ["reachable(psm1,b(1,1))", "reachable(psm1,b(2,1))"]
+    statics += ["reachable(psm2,b(1,2))", "reachable(psm2,b(2,2))"]
+    return PlanningScene.make(names, blocks, (0.01, 0.04, -0.001), statics)

@@ -21,14 +21,8 @@ AT_LIMIT = [*HELD, "max_height(psm1)"]
 
 
 @pytest.fixture(scope="module")
-def scene() -> PlanningScene:
-    """Four blocks 40 mm apart, the ROI 10 mm beside (1,2), an attachment under (1,1)."""
-    names = ["b(1,1)", "b(1,2)", "b(2,1)", "b(2,2)"]
-    blocks = [(0.0, 0.0, 0.0), (0.0, 0.04, 0.0), (0.04, 0.0, 0.0), (0.04, 0.04, 0.0)]
-    statics = ["fixed(b(1,1))", "above_roi(b(1,2))"]
-    statics += ["reachable(psm1,b(1,1))", "reachable(psm1,b(2,1))"]
-    statics += ["reachable(psm2,b(1,2))", "reachable(psm2,b(2,2))"]
-    return PlanningScene.make(names, blocks, (0.01, 0.04, -0.001), statics)
+def scene(four_blocks: PlanningScene) -> PlanningScene:
+    return four_blocks
 
 
 @pytest.fixture(scope="module")
