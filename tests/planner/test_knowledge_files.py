@@ -78,6 +78,17 @@ def test_a_fault_is_told_with_file_and_line(copy: Path, file: str, rule: str, sa
     assert says in caught.value.message
 
 
+@pytest.mark.parametrize(
+    "rule", ['sentence(1,"{} {}",()).', 'sentence(1,hello,()).', 'sentence(foo,"x",()).',
+             'sentence(1,"x").'],
+)  # fmt: skip
+def test_a_sentence_that_can_not_be_said_is_a_fault(copy: Path, rule: str) -> None:
+    with (copy / "explain.lp").open("a") as out:
+        out.write(f"#program explain.\n{rule}\n")
+    with pytest.raises(KnowledgeFault, match="sentence"):
+        load_knowledge(copy)
+
+
 def test_what_a_file_leaves_open_is_its_own_fault(copy: Path) -> None:
     path = copy / "target.lp"
     with path.open("a") as out:

@@ -23,7 +23,8 @@ WORDING = ("explain.lp", "because.lp", "why_not_block.lp", "why_not_action.lp")
 JUDGING = ("verify.lp",)
 # Rules whose absence nothing shows, with the reason why they stay.
 EQUIVALENT: dict[str, str] = {
-    'sentence(3,"It leads nowhere now.",()) :- not possible; not core(_); not told.': (
+    'sentence(3,"It leads nowhere now.",()) :- '
+    "not possible; not core(_); not undecided; not told.": (
         "answers for constraints without a name, of which there are none here"
     ),
 }
@@ -208,6 +209,8 @@ def answers(knowledge: Knowledge) -> Iterator[object]:
         planner = Planner(knowledge, tissue, criterion, goal, horizon)
         for question, state in asked:
             yield outcome(planner.why_not, question, state.split())
+    spent = Planner(knowledge, TISSUE, conflict_budget=0)
+    yield outcome(spent.why_not, "reach(psm2,b(3,3))", [])
 
 
 # Why a plan is made, as the executive says it.

@@ -97,6 +97,8 @@ def test_a_context_alone_is_refused_with_its_error() -> None:
     [
         ("", "Input data was truncated"),
         ("{", "Input data was truncated"),
+        ("[" * 100_000, "recursion|truncated"),
+        (b'{"names": ["\xff"]}', "utf-8"),
         ("3", "Expected `object`, got `int`"),
         ('{"names": []}', "missing required field `blocks_m`"),
         (json.dumps({**CONTEXT, "blocks_m": [[0, 0]]}), r"\$\[0\].blocks_m\[0\]"),
@@ -104,7 +106,7 @@ def test_a_context_alone_is_refused_with_its_error() -> None:
         (json.dumps({**CONTEXT, "fluents": None}), r"\$\[0\].fluents"),
     ],
 )
-def test_what_is_no_context_is_refused_with_its_place(text: str, says: str) -> None:
+def test_what_is_no_context_is_refused_with_its_place(text: str | bytes, says: str) -> None:
     with pytest.raises(BadContext, match=says) as caught:
         read_contexts(text, "here.json")
     assert str(caught.value).startswith("here.json: ")

@@ -119,7 +119,7 @@ def test_evidence_of_what_was_not_sensed_is_not_told(planner: Planner) -> None:
         "max_height(psm2": {"limit_n": 0.5, "force_n": 0.4},
         "visible_roi. occurs(release,psm1,1)": {"visible_fraction": 1.0},
         "max_height(psm2)": {"limit_n": 0.5, "force_n": 0.4},
-        "visible_roi": {"visible_fraction": float("nan"), "threshold_fraction": 0.7},
+        "visible_roi": {"visible_fraction": float("nan"), "threshold_fraction": 1e308},
     }
     plain = planner.plan([], reason="exposure")
     assert planner.plan([], reason="exposure", evidence=odd).explanation == plain.explanation
@@ -131,6 +131,10 @@ def test_evidence_of_what_was_not_sensed_is_not_told(planner: Planner) -> None:
         ("exposure", "Planned anew: all actions of the plan before are done."),
         ("hold", "Planned anew: a person stopped the arms and let them go again."),
         ("nothing_in_reach", "Planned anew: the jaw closed on nothing."),
+        (
+            "hold: at the door",
+            "Planned anew: a person stopped the arms and let them go again, at the door.",
+        ),
         ("slipped", "Planned anew: slipped."),
         (
             "deviation: in_hand(psm1,b(1,1)) expected after grasp(psm1,b(1,1))",

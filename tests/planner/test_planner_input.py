@@ -50,6 +50,10 @@ def context(scene: PlanningScene, *fluents: str) -> Context:
         "",
         "17",
         "arm(psm3)",
+        # Terms that clingo would work out to others.
+        "visible_roi()",
+        "at(psm1,b(0+1,1))",
+        "fixed(b(1,0x1))",
     ],
 )
 def test_what_is_not_in_the_signature_is_refused(planner: Planner, atom: str) -> None:

@@ -10,6 +10,7 @@ from fras_planner.planning import (
     Knowledge,
     KnowledgeFault,
     Planner,
+    PlanningError,
     PlanningScene,
     UnknownFluent,
     verify,
@@ -171,6 +172,43 @@ def test_a_specification_without_words_is_a_fault(knowledge: Knowledge) -> None:
 def test_an_atom_that_is_neither_fluent_nor_action_is_refused(knowledge: Knowledge) -> None:
     with pytest.raises(UnknownFluent, match="cauterise"):
         verify(knowledge, history(("cauterise(psm1)",)))
+
+
+def test_a_gap_in_the_steps_forgets_no_grasp(knowledge: Knowledge) -> None:
+    grasp = ("grasp(psm1,b(1,1))", "at(psm1,b(1,1))")
+    found = verify(knowledge, {2: SCENE, 5: grasp, 9: grasp})
+    assert [(one.rule, one.t) for one in found] == [("release_before_regrasp", 9)]
+    assert found[0].sentence.startswith("step 9: ")
+
+
+@pytest.mark.parametrize(
+    "atom",
+    [
+        "reach(psm1", "visible_roi(x", "fixed(b(1,1)", "reach", "release(psm1,psm1)",
+        "pull(psm7,b(1,1))", "reachable(psm1,b(1,1)). reachable(psm2,b(1,1))",
+    ],
+)  # fmt: skip
+def test_a_malformed_atom_is_refused(knowledge: Knowledge, atom: str) -> None:
+    with pytest.raises(PlanningError):
+        verify(knowledge, history((atom,)))
+
+
+@pytest.mark.parametrize(
+    "rules",
+    [
+        'specification(foo,"{} and {}"). violation(foo,T,(A,)) :- done(reach(A,_),T).',
+        'specification(foo,"{x} {"). violation(foo,T,(A,)) :- done(reach(A,_),T).',
+        'specification(foo,"{}"). violation(foo,T,5) :- done(reach(A,_),T).',
+        'specification(foo,"{}"). violation(foo,now,(A,)) :- done(reach(A,_),T).',
+        "specification(foo,bar). violation(foo,T,(A,)) :- done(reach(A,_),T).",
+        "violation(foo,T) :- done(reach(_,_),T).",
+    ],
+)
+def test_a_specification_that_can_not_be_said_is_a_fault(knowledge: Knowledge, rules: str) -> None:
+    text = knowledge.files["verify.lp"] + rules
+    own = dataclasses.replace(knowledge, files={**knowledge.files, "verify.lp": text})
+    with pytest.raises(KnowledgeFault):
+        verify(own, history(SOUND[0]))
 
 
 @pytest.mark.parametrize("goal", ["visible", "clear"])

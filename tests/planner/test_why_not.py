@@ -172,6 +172,14 @@ def test_without_any_plan_a_block_is_not_at_fault(
     assert answer.sentences == ("After it no plan of at most 2 actions reaches the goal.",)
 
 
+def test_a_spent_budget_decides_nothing(knowledge: Knowledge, scene: PlanningScene) -> None:
+    answer = Planner(knowledge, scene, conflict_budget=0).why_not("reach(psm2,b(2,2))", [])
+    assert answer.rules == ()
+    assert answer.sentences == (
+        "The search ended before that was decided: allow it more conflicts.",
+    )
+
+
 def test_equals_differ_by_their_indices(knowledge: Knowledge) -> None:
     names = ["b(1,1)", "b(2,2)"]
     statics = [f"reachable(psm1,{name})" for name in names]
@@ -204,7 +212,9 @@ def test_the_other_arm_and_one_action_more(knowledge: Knowledge) -> None:
     [
         ("fly(psm1)", UnknownAction, "release(arm)"),
         ("pull(psm1)", UnknownAction, "pull(arm,block)"),
-        ("b(9,9)", UnknownAction, "b(i,j)"),
+        ("b(9,9)", UnknownBlock, "known: b(1,1), b(1,2), b(2,1), b(2,2)"),
+        ("b(x,y)", UnknownAction, "b(i,j)"),
+        ("b(0+1,1)", UnknownAction, "b(i,j)"),
         ("pull(psm1,", UnknownAction, "move(arm,block)"),
         ("pull(psm3,b(1,1))", UnknownArm, "psm1, psm2"),
         ("pull(psm1,b(9,9))", UnknownBlock, "b(1,1)"),

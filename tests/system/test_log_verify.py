@@ -2,6 +2,7 @@
 
 import dataclasses
 import io
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -35,8 +36,8 @@ def test_an_action_that_breaks_one_is_told(trials: Any, monkeypatch: pytest.Monk
     assert verify_log(log, None, Console(file=told, width=200)) == 1
     text = told.getvalue()
     assert "with its gripper closed" in text
-    assert "The planner itself said at the end: []" in text
-    assert "3 actions verified: 1 specifications broken." in text
+    assert "The planner itself said otherwise: that all were kept" in text
+    assert "3 actions verified: specifications broken: 1." in text
 
 
 def test_a_log_without_what_led_to_an_action_is_named(
@@ -47,3 +48,17 @@ def test_a_log_without_what_led_to_an_action_is_named(
     monkeypatch.setattr("fras_cli.log_verify.read_trial", lambda _: cut)
     with pytest.raises(LogIncomplete, match="what led to action g1"):
         verify_log(log, None, Console(file=io.StringIO()))
+
+
+def test_a_log_that_is_damaged_or_cut_off_is_not_certified(trials: Any, tmp_path: Path) -> None:
+    _, log = trials.run("a")
+    whole = log.read_bytes()
+    flipped = bytearray(whole)
+    flipped[len(whole) // 2] ^= 0xFF
+    for name, content in {"flipped": bytes(flipped), "cut": whole[: len(whole) // 2]}.items():
+        path = tmp_path / f"{name}.mcap"
+        path.write_bytes(content)
+        told = io.StringIO()
+        assert verify_log(path, None, Console(file=told, width=200)) == 1, name
+        assert "all specifications kept" not in told.getvalue()
+        assert "damaged" in told.getvalue()

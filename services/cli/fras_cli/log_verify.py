@@ -18,7 +18,7 @@ class LogIncomplete(FrasError):
 
 
 def verify_log(path: Path, asp_dir: Path | None, console: Console) -> int:
-    """Print which specifications were broken; 0 if none was, else 1.
+    """Print which specifications were broken; 0 if none was in a whole trial, else 1.
 
     Raises
     ------
@@ -33,13 +33,18 @@ def verify_log(path: Path, asp_dir: Path | None, console: Console) -> int:
     for sentence in broken:
         console.print(escape(sentence))
     said = trial.ending.violations if trial.ending is not None else None
-    if said is None:
-        console.print("The log ends before the trial did: what is in it was verified.")
+    if trial.damage:
+        console.print(f"The log is damaged: {escape(trial.damage)}")
+    elif said is None:
+        console.print("The log ends before the trial did.")
     elif list(said) != broken:
-        console.print(f"The planner itself said at the end: {escape(str(said))}")
-    verdict = f"{len(broken)} specifications broken" if broken else "all specifications kept"
+        told = "; ".join(said) or "that all were kept"
+        console.print(f"The planner itself said otherwise: {escape(told)}")
+    is_whole = not trial.damage and said is not None
+    kept = "all specifications kept" if is_whole else "no specification broken by these"
+    verdict = f"specifications broken: {len(broken)}" if broken else kept
     console.print(f"{len(history)} actions verified: {verdict}.")
-    return EXIT_NOT_SUCCESS if broken or (said is not None and list(said) != broken) else 0
+    return 0 if is_whole and list(said or []) == broken == [] else EXIT_NOT_SUCCESS
 
 
 def executed_history(trial: Trial) -> dict[int, list[str]]:

@@ -81,21 +81,24 @@ def _print_row(row: Row, console: Console) -> None:
 
 
 def _timetable(row: Row) -> Table:
-    """Each step: what is done, and which atoms begin and cease to hold through it."""
-    actions = {action["t"]: action["text"] for action in row["actions"]}
+    """Each action, and which atoms begin and cease to hold through it."""
     table = Table("step", "action", "begins to hold", "ceases to hold", title="Timetable")
-    before: set[str] = set()
-    for step, atoms in sorted(row["history"].items(), key=lambda item: int(item[0])):
-        t = int(step)
-        now = {atom for atom in atoms if not _lasts(atom)} - {actions.get(t, "")}
-        table.add_row(
-            str(t),
-            actions.get(t, ""),
-            "\n".join(sorted(now - before)),
-            "\n".join(sorted(before - now)),
-        )
-        before = now
+    holds = {
+        int(t): {atom for atom in atoms if not _lasts(atom)} for t, atoms in row["history"].items()
+    }
+    table.add_row("", "at the start", *_changes(set(), holds[1] - {_at(row, 1)}))
+    for t in range(1, len(holds)):
+        before, after = holds[t] - {_at(row, t)}, holds[t + 1] - {_at(row, t + 1)}
+        table.add_row(str(t), _at(row, t), *_changes(before, after))
     return table
+
+
+def _at(row: Row, step: int) -> str:
+    return next((action["text"] for action in row["actions"] if action["t"] == step), "")
+
+
+def _changes(before: set[str], after: set[str]) -> tuple[str, str]:
+    return "\n".join(sorted(after - before)), "\n".join(sorted(before - after))
 
 
 def _lasts(atom: str) -> bool:

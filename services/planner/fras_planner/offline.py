@@ -57,7 +57,7 @@ def read_contexts(text: bytes | str, place: str) -> tuple[list[Context], bool]:
         raw: Any = msgspec.json.decode(text)
         is_list = isinstance(raw, list)
         files = msgspec.convert(raw if is_list else [raw], list[ContextFile])
-    except msgspec.MsgspecError as error:
+    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
         raise BadContext(
             f"{place}: {error}; a context has names, blocks_m, roi_m [m] and fluents, and may have "
             "fixed_points_m, tried, ignore_ap, evidence and reason",

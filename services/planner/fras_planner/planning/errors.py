@@ -1,5 +1,6 @@
 """What can be wrong with what the planner is given; each error names the culprit."""
 
+import re
 from collections.abc import Iterable
 
 from fras_common.errors import FrasError
@@ -12,6 +13,11 @@ def _some(items: Iterable[str]) -> str:
     listed = list(items)
     rest = len(listed) - SHOWN
     return ", ".join(listed[:SHOWN]) + (f", ... ({rest} more)" if rest > 0 else "")
+
+
+def _by_indices(block: str) -> list[int]:
+    """b(2,10) after b(2,9)."""
+    return [int(number) for number in re.findall("[0-9]+", block)]
 
 
 class PlanningError(FrasError):
@@ -111,7 +117,7 @@ class UnknownBlock(PlanningError):
     known: tuple[str, ...]
 
     def __init__(self, atom: str, block: str, known: Iterable[str]) -> None:
-        names = tuple(known)
+        names = tuple(sorted(known, key=_by_indices))
         super().__init__(
             f"'{atom}': no block '{block}'; known: {_some(names)}",
             atom=atom,

@@ -17,7 +17,7 @@ MAX_COORDINATE_M = 10.0
 # Criteria may weigh a distance: leave room for a factor of two, and for the difference of two.
 HEADROOM = 4
 ROWS_AT_A_TIME = 256
-NAME = re.compile(r"b\([1-9]\d{0,4},[1-9]\d{0,4}\)")
+NAME = re.compile(r"b\([1-9][0-9]{0,4},[1-9][0-9]{0,4}\)")
 
 
 def whole_mm(distances_m: NDArray[np.float64]) -> NDArray[np.int64]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import clingo
 
+from fras_planner.planning.errors import KnowledgeFault
 from fras_planner.planning.plan import PlannedAction
 from fras_planner.planning.program import (
     TELL_FILES,
@@ -41,10 +42,10 @@ def tell_plan(knowledge: Knowledge, facts: Iterable[str], steps: int) -> Story:
     """
     told = _told(knowledge, [*facts, f"step(1..{steps})"], ("history", "explain"))
     expected: dict[int, list[str]] = defaultdict(list)
-    for t, atom in _rows(told, "expected", 2):
+    for t, atom in told.rows("expected", 2):
         expected[t.number].append(str(atom))
     holds: dict[int, list[str]] = defaultdict(list)
-    for atom, t in _rows(told, "holds", 2):
+    for atom, t in told.rows("holds", 2):
         holds[t.number].append(str(atom))
     actions = {
         t.number: PlannedAction(
@@ -54,13 +55,13 @@ def tell_plan(knowledge: Knowledge, facts: Iterable[str], steps: int) -> Story:
             args=tuple(str(argument) for argument in action.arguments),
             expected=tuple(sorted(expected[t.number])),
         )
-        for action, t in _rows(told, "does", 2)
+        for action, t in told.rows("does", 2)
     }
     history = {
         t: (*([actions[t].text] if t in actions else []), *sorted(holds[t]))
         for t in range(1, steps + 1)
     }
-    return Story(tuple(actions[t] for t in sorted(actions)), history, _sentences(told))
+    return Story(tuple(actions[t] for t in sorted(actions)), history, _sentences(knowledge, told))
 
 
 def tell_no_plan(
@@ -68,7 +69,7 @@ def tell_no_plan(
 ) -> tuple[str, ...]:
     """Tell why there is no plan, from the scene's facts, the context and the core of rules."""
     blamed = [f"core({rule})" for rule in core]
-    return _sentences(_told(knowledge, [*facts, *blamed], ("no_plan",)))
+    return _sentences(knowledge, _told(knowledge, [*facts, *blamed], ("no_plan",)))
 
 
 def tell_why_not_block(
@@ -76,12 +77,12 @@ def tell_why_not_block(
 ) -> tuple[str, ...]:
     """Tell why a plan does not grasp the block asked about; `preference`: the criterion's file."""
     files = (*WHY_NOT_BLOCK_FILES, preference)
-    return _sentences(_told(knowledge, facts, ("why_not_block",), files))
+    return _sentences(knowledge, _told(knowledge, facts, ("why_not_block",), files))
 
 
 def tell_why_not_action(knowledge: Knowledge, facts: Iterable[str]) -> tuple[str, ...]:
     """Tell why a plan does not begin with the action asked about."""
-    return _sentences(_told(knowledge, facts, ("why_not_action",), WHY_NOT_ACTION_FILES))
+    return _sentences(knowledge, _told(knowledge, facts, ("why_not_action",), WHY_NOT_ACTION_FILES))
 
 
 def _told(
@@ -97,17 +98,20 @@ def _told(
     return program
 
 
-def _rows(told: Program, predicate: str, arity: int) -> list[Sequence[clingo.Symbol]]:
-    atoms = told.control.symbolic_atoms.by_signature(predicate, arity)
-    return [atom.symbol.arguments for atom in atoms]
-
-
-def _sentences(told: Program) -> tuple[str, ...]:
-    rows = [
-        (order.number, text.string, [_spoken(value) for value in values.arguments])
-        for order, text, values in _rows(told, "sentence", 3)
-    ]
-    return tuple(text.format(*values) for _, text, values in sorted(rows))
+def _sentences(knowledge: Knowledge, told: Program) -> tuple[str, ...]:
+    found: list[tuple[int, str]] = []
+    for row in told.rows("sentence", 3):
+        order, text, values = row
+        try:
+            words = [_spoken(value) for value in values.arguments]
+            found.append((order.number, text.string.format(*words)))
+        except (LookupError, RuntimeError, ValueError) as error:
+            problem = (
+                f"sentence({','.join(map(str, row))}) can't be said "
+                f"({type(error).__name__}: {error})"
+            )
+            raise KnowledgeFault(knowledge.origin, 0, problem) from error
+    return tuple(sentence for _, sentence in sorted(found))
 
 
 def _spoken(value: clingo.Symbol) -> str:

@@ -1,11 +1,15 @@
 """What a plan is made for, as facts: the reason, and the numbers behind what was sensed."""
 
-import math
 from collections.abc import Container, Mapping
+
+from fras_planner.planning.signature import normalised
 
 Evidence = Mapping[str, Mapping[str, float]]
 # Its numbers are told whether it holds or not.
 GOAL = "visible_roi"
+# Larger is no measurement, and longer no reason.
+MOST = 1e6
+LONGEST = 500
 
 
 def occasion(reason: str, evidence: Evidence, sensed: Container[str]) -> list[str]:
@@ -22,12 +26,13 @@ def occasion(reason: str, evidence: Evidence, sensed: Container[str]) -> list[st
     """
     kind, _, detail = reason.partition(":")
     facts = [f"reason({_quoted(kind.strip())},{_quoted(detail.strip())})"]
-    for atom, numbers in evidence.items():
+    for text, numbers in evidence.items():
+        atom = normalised(text)
         if atom == GOAL or atom in sensed:
             facts += [
                 f"evidence({atom},{_quoted(name)},{_quoted(spoken(name, value))})"
                 for name, value in numbers.items()
-                if math.isfinite(value)
+                if abs(value) < MOST
             ]
     return facts
 
@@ -44,6 +49,6 @@ def spoken(name: str, value: float) -> str:
 
 
 def _quoted(text: str) -> str:
-    printable = "".join(letter if letter.isprintable() else " " for letter in text)
+    printable = "".join(letter if letter.isprintable() else " " for letter in text[:LONGEST])
     escaped = printable.replace("\\", "\\\\").replace('"', '\\"')
     return f'"{escaped}"'

@@ -113,9 +113,24 @@ class Program:
         wanted = [(name, [clingo.Number(value) for value in values]) for name, values in parts]
         text = "".join(f"{fact}.\n" for fact in facts)
         if text:
-            self.control.add("facts", [], text)
+            self._guard(lambda: self.control.add("facts", [], text))
             wanted.insert(0, ("facts", []))
         self._guard(lambda: self.control.ground(wanted))
+
+    def rows(self, predicate: str, arity: int) -> list[Sequence[clingo.Symbol]]:
+        """Return the arguments of all atoms of a predicate.
+
+        Raises
+        ------
+        KnowledgeFault
+            If it is also there with another number of arguments: those would be overlooked.
+        """
+        atoms = self.control.symbolic_atoms
+        others = {n for name, n, _ in atoms.signatures if name == predicate} - {arity}
+        if others:
+            problem = f"{predicate}/{others.pop()} is not understood, only {predicate}/{arity}"
+            raise KnowledgeFault(self._origin, 0, problem)
+        return [atom.symbol.arguments for atom in atoms.by_signature(predicate, arity)]
 
     def _guard(self, step: Callable[[], None]) -> None:
         try:

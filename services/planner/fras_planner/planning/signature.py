@@ -129,8 +129,10 @@ def _parsed(text: str, sorts: Mapping[str, tuple[str, ...]]) -> clingo.Symbol | 
     except RuntimeError:
         # clingo says no more than that it is no term; the list of forms says what is one.
         return None
+    # clingo works terms out: `b(0+1,1)` would be another name of a block, unknown to the rest.
     fits = (
-        symbol.type == clingo.SymbolType.Function
+        str(symbol) == text
+        and symbol.type == clingo.SymbolType.Function
         and symbol.positive
         and symbol.name in sorts
         and len(symbol.arguments) == len(sorts[symbol.name])

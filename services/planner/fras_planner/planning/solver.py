@@ -10,8 +10,10 @@ from fras_planner.planning.errors import (
     ContradictoryFluents,
     SceneChanged,
     SceneOutOfBounds,
+    UnknownBlock,
     UnknownGoal,
 )
+from fras_planner.planning.measures import NAME
 from fras_planner.planning.narrator import (
     tell_no_plan,
     tell_plan,
@@ -240,7 +242,9 @@ class Planner:
             As for `plan`.
         """
         asked = normalised(question)
-        is_block = asked in self._facts.blocks
+        is_block = NAME.fullmatch(asked) is not None
+        if is_block and asked not in self._facts.blocks:
+            raise UnknownBlock(asked, asked, self._facts.blocks)
         action = None if is_block else self._knowledge.alphabet.action(asked, self._facts.blocks)
         plan = self.plan(fluents, ignore_ap, tried)
         block = asked if action is None else str(action.arguments[-1])
@@ -282,7 +286,9 @@ class Planner:
         if len(given) < len(wanted):
             return [], []
         best = _Best()
-        self._control.solve([*given, *self._assumptions], on_model=best.take)
+        result = self._control.solve([*given, *self._assumptions], on_model=best.take)
+        if not best.models and not result.unsatisfiable:
+            return [], ["undecided"]
         if best.models:
             prices = zip(best.levels, best.cost, plan.cost or best.cost, strict=True)
             worse = next(((level, by - of) for level, by, of in prices if by != of), None)

@@ -1,6 +1,6 @@
 """Holds a history, planned or executed, against the safety specifications in `verify.lp`."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import clingo
@@ -54,26 +54,28 @@ def verify(knowledge: Knowledge, history: Mapping[int, Iterable[str]]) -> tuple[
     forms = _Forms(knowledge)
     scene: set[str] = set()
     facts: list[str] = []
-    for t, atoms in history.items():
-        for text in atoms:
+    # The rules count steps one by one; what was refused may have left a gap.
+    steps = sorted(history)
+    for place, t in enumerate(steps, start=1):
+        for text in history[t]:
             form, atom = forms[text]
             if form:
-                facts.append(f"{form}({atom},{t})")
+                facts.append(f"{form}({atom},{place})")
             else:
                 scene.add(atom)
     program = Program(knowledge, VERIFY_FILES, ())
     program.ground(("base", ()), facts=[*sorted(scene), *facts])
-    atoms = program.control.symbolic_atoms
-    words = {
-        str(atom.symbol.arguments[0]): atom.symbol.arguments[1].string
-        for atom in atoms.by_signature("specification", 2)
-    }
-    for atom in atoms.by_signature("violation", 3):
-        rule = str(atom.symbol.arguments[0])
-        if rule not in words:
-            problem = f"violation({rule},...) has no specification({rule},Text)"
-            raise KnowledgeFault(f"{knowledge.origin}/{VERIFY_FILES[0]}", 0, problem)
-    found = [_violation(atom.symbol, words) for atom in atoms.by_signature("violation", 3)]
+    words = {str(rule): text for rule, text in program.rows("specification", 2)}
+    found: list[Violation] = []
+    for row in program.rows("violation", 3):
+        try:
+            found.append(_violation(row, words, steps))
+        except (LookupError, RuntimeError, ValueError) as error:
+            problem = (
+                f"violation({','.join(map(str, row))}) does not fit its specification "
+                f"({type(error).__name__}: {error})"
+            )
+            raise KnowledgeFault(f"{knowledge.origin}/{VERIFY_FILES[0]}", 0, problem) from error
     return tuple(sorted(found, key=lambda one: (one.t, one.rule, one.sentence)))
 
 
@@ -87,15 +89,30 @@ class _Forms(dict[str, tuple[str, str]]):
     def __missing__(self, text: str) -> tuple[str, str]:
         atom = normalised(text)
         if functor(atom) in self._alphabet.actions:
+            self._alphabet.action(atom, _EVERY_BLOCK)
             form = "done"
         else:
+            self._alphabet.symbol(atom, _EVERY_BLOCK)
             form = "" if self._alphabet.kind(atom) == STATIC else "now"
         self[text] = form, atom
         return self[text]
 
 
-def _violation(symbol: clingo.Symbol, words: Mapping[str, str]) -> Violation:
-    rule, t, about = symbol.arguments
+class _EveryBlock(frozenset[str]):
+    """A history may be of any scene: that a block is in it is not ours to check."""
+
+    def __contains__(self, block: object) -> bool:
+        return True
+
+
+_EVERY_BLOCK = _EveryBlock()
+
+
+def _violation(
+    row: Sequence[clingo.Symbol], words: Mapping[str, clingo.Symbol], steps: Sequence[int]
+) -> Violation:
+    rule, place, about = row
+    t = steps[place.number - 1]
     values = [str(value) for value in about.arguments]
-    sentence = words[str(rule)].format(*values)
-    return Violation(str(rule), t.number, f"step {t.number}: {sentence}.")
+    sentence = words[str(rule)].string.format(*values)
+    return Violation(str(rule), t, f"step {t}: {sentence}.")
