@@ -114,6 +114,19 @@ def test_a_first_plan_says_nothing_of_that(planner: Planner) -> None:
     assert planner.plan([], evidence=LIMITED).explanation == planner.plan([]).explanation
 
 
+def test_that_there_is_no_plan_is_told_after_why_one_was_sought(
+    planner: Planner, scene: PlanningScene
+) -> None:
+    none = planner.plan([], tried=scene.names, reason="force", evidence=LIMITED).no_plan
+    assert none is not None
+    assert none.sentences[:3] == (
+        "Planned anew: the force limit was crossed.",
+        "41.2 % of the tissue over the region of interest is lifted clear of it; more than 70.0 % "
+        "is needed.",
+        "No plan of at most 5 actions reaches the goal.",
+    )
+
+
 def test_evidence_of_what_was_not_sensed_is_not_told(planner: Planner) -> None:
     odd = {
         "max_height(psm2": {"limit_n": 0.5, "force_n": 0.4},

@@ -40,7 +40,7 @@ def tell_plan(knowledge: Knowledge, facts: Iterable[str], steps: int) -> Story:
     steps : int
         Steps of the plan, the last one included at which the goal holds.
     """
-    told = _told(knowledge, [*facts, f"step(1..{steps})"], ("history", "explain"))
+    told = _told(knowledge, [*facts, f"step(1..{steps})"], ("history", "explain", "because"))
     expected: dict[int, list[str]] = defaultdict(list)
     for t, atom in told.rows("expected", 2):
         expected[t.number].append(str(atom))
@@ -69,7 +69,7 @@ def tell_no_plan(
 ) -> tuple[str, ...]:
     """Tell why there is no plan, from the scene's facts, the context and the core of rules."""
     blamed = [f"core({rule})" for rule in core]
-    return _sentences(knowledge, _told(knowledge, [*facts, *blamed], ("no_plan",)))
+    return _sentences(knowledge, _told(knowledge, [*facts, *blamed], ("no_plan", "because")))
 
 
 def tell_why_not_block(

@@ -191,7 +191,7 @@ class Planner:
         ground_s, self._ground_s = self._ground_s, 0.0
         if not best.models:
             proved = bool(result.unsatisfiable)
-            none = self._why_none(sensed, proved=proved)
+            none = self._why_none(sensed, occasion(reason, evidence or {}, sensed), proved=proved)
             return Plan((), "", "", (), 0, ground_s, solve_s, {}, none.sentences, none, proved)
         self._check_contradictions(best, sensed)
         steps = 1 + len(best.named("occurs"))
@@ -354,7 +354,7 @@ class Planner:
             f"count(actions,{actions})",
         ]
 
-    def _why_none(self, sensed: Sensed, *, proved: bool) -> NoPlan:
+    def _why_none(self, sensed: Sensed, why_now: list[str], *, proved: bool) -> NoPlan:
         core = ["search_budget"]
         best = _Best()
         with self._any_model():
@@ -363,5 +363,5 @@ class Planner:
             self._check_contradictions(best, sensed)
             if proved:
                 core = minimal_core(self._control, self._rules)
-        facts = [*self._facts.all, *sensed, *self._counts(best, self._horizon)]
+        facts = [*self._facts.all, *sensed, *why_now, *self._counts(best, self._horizon)]
         return NoPlan(tuple(core), tell_no_plan(self._knowledge, facts, core))
