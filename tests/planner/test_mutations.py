@@ -234,6 +234,12 @@ def explained(knowledge: Knowledge) -> Iterator[object]:
     """All that is worded by `explain.lp`: plans, their absence, and the names of rules."""
     yield from fingerprint(knowledge)
     yield from answers(knowledge)
+    # Blocks that both arms reach, one of them with its gripper closed.
+    for arm in ("psm1", "psm2"):
+        tried = [f"tried(b({i},{j}))" for i in ROWS for j in (1, 3)]
+        yield outcome(
+            planned, Planner(knowledge, TISSUE), " ".join([*tried, f"closed_gripper({arm})"])
+        )
 
 
 # Histories, each of which breaks one specification; atoms stand at the steps given.

@@ -26,6 +26,7 @@ def bare(scene: PlanningScene, *statics: str) -> PlanningScene:
 
 def test_the_choice_is_told_with_its_numbers(planner: Planner) -> None:
     assert planner.plan([]).explanation == (
+        "psm2 goes for b(2,2): no other arm reaches it.",
         "psm2 grasps b(2,2): 57 mm from the nearest attachment, 30 mm from the region of interest; "
         "best of 3 candidate blocks under the criterion 'weighted'.",
         "psm2 pulls b(2,2) up to expose the region of interest.",
@@ -33,7 +34,7 @@ def test_the_choice_is_told_with_its_numbers(planner: Planner) -> None:
 
 
 def test_a_choice_that_ignores_attachments_says_so(planner: Planner) -> None:
-    assert planner.plan([], ignore_ap=True).explanation[0] == (
+    assert planner.plan([], ignore_ap=True).explanation[1] == (
         "psm2 grasps b(1,2): 10 mm from the region of interest, the nearest of 4 candidate blocks; "
         "attachment points are ignored as asked."
     )
@@ -41,9 +42,19 @@ def test_a_choice_that_ignores_attachments_says_so(planner: Planner) -> None:
 
 def test_a_choice_without_attachments_says_so(knowledge: Knowledge, scene: PlanningScene) -> None:
     free = bare(scene, *(atom for atom in scene.statics if not atom.startswith("fixed")))
-    assert Planner(knowledge, free).plan([], tried=["b(1,1)"]).explanation[0] == (
+    assert Planner(knowledge, free).plan([], tried=["b(1,1)"]).explanation[1] == (
         "psm2 grasps b(1,2): no attachment is known, 10 mm from the region of interest; "
         "best of 3 candidate blocks under the criterion 'weighted'."
+    )
+
+
+def test_of_two_arms_the_choice_is_told(knowledge: Knowledge, scene: PlanningScene) -> None:
+    both = Planner(knowledge, bare(scene, *scene.statics, "reachable(psm1,b(2,2))"))
+    assert both.plan([]).explanation[0] == (
+        "psm1 goes for b(2,2): both arms reach it, and psm1 comes first."
+    )
+    assert both.plan(["closed_gripper(psm1)"]).explanation[0] == (
+        "psm2 goes for b(2,2): both arms reach it, and psm2 needs fewer actions."
     )
 
 

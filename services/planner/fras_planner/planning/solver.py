@@ -344,6 +344,8 @@ class Planner:
         involved += [str(block) for _, block in best.named("target")]
         shown = [str(atom) for atom in best.atoms]
         about = self._facts.about(involved)
+        for _, block in best.named("target"):
+            about += self._facts.reachable(str(block))
         return [*shown, *sensed, *about, *self._facts.above_roi, *self._counts(best, steps - 1)]
 
     def _counts(self, best: _Best, actions: int) -> list[str]:
