@@ -110,6 +110,23 @@ def test_a_shaken_body_is_not_guessed_to_burst(speed_m_s, seed):
     assert result.solver.iterations <= 42
 
 
+@pytest.mark.parametrize("held", [True, False])
+def test_a_guess_that_the_material_can_not_be_is_made_again(held):
+    """Coasting at such a speed turns neo-Hookean elements inside out: infinite energy."""
+    mesh = box_mesh(node_counts=(5, 6, 2))
+    tip_m = mesh.nodes_m[-1]
+    parameters = TissueParameters(material="neo-hookean")
+    tissue = TissueSimulator(mesh, parameters, mesh.bottom_nodes[:15])
+    tissue.step({"psm1": ToolInput(tip_m, 1.0)})
+    jaw = -0.3 if held else 1.0
+    tissue.step({"psm1": ToolInput(tip_m, jaw)})
+    calm = tissue.checkpoint()
+    shaken = calm.velocity_m_s.copy()
+    shaken[45] = [0.0, 0.0, -0.5]
+    tissue.restore(dataclasses.replace(calm, velocity_m_s=shaken))
+    assert tissue.step({"psm1": ToolInput(tip_m, jaw)}).solver.converged
+
+
 def blas_threads():
     return {(x["filepath"], x["num_threads"]) for x in threadpool_info() if x["user_api"] == "blas"}
 

@@ -153,7 +153,8 @@ class ImplicitEuler:
         -----
         The first guess goes on at the old velocity, and after an easy step at the old acceleration
         as well; where the held nodes don't, the others take the linear answer to the difference. If
-        that doubles the energy, the answer is sought from where the body was, too. A matrix that
+        that doubles the energy, or goes beyond what the material can be, the answer is sought from
+        where the body was, too. A matrix that
         can't be factored ends the step as not converged, as does a material that no first guess
         keeps within its bounds.
         """
@@ -241,7 +242,7 @@ class ImplicitEuler:
         """Return the first guess, its energy and gradient."""
         coasting = self._coasting(problem.before)
         guess, before = self._lead(coasting, problem, held, held_at_m)
-        if guess[1] <= before + abs(before):
+        if np.isfinite(guess[1]) and guess[1] <= before + abs(before):
             return guess
         other, _ = self._lead(problem.before.x, problem, held, held_at_m)
         return min(guess, other, key=lambda x: x[1] if np.isfinite(x[1]) else np.inf)

@@ -112,9 +112,8 @@ class _Parts:
         side = self._side
         side[lower], side[upper] = 1, 2
         here, there = self._graph.edges(nodes)
-        across = side[here] + side[there] == 3
-        across &= side[here] > 0
-        touching = np.unique(here[across & (side[there] > 0)])
+        # Nodes of other parts have no side: 1 and 2 are all that make 3.
+        touching = np.unique(here[side[here] + side[there] == 3])
         cuts = [touching[side[touching] == which] for which in (1, 2)]
         which = int(len(cuts[1]) < len(cuts[0]))
         side[cuts[which]] = 0

@@ -7,8 +7,8 @@ A front of s own and b border rows is a column-major matrix of f = s + b rows an
 `stack`, where its parent finds it. Only lower triangles mean anything.
 
 For substitution four columns of L are packed one after the other into what is read from front to
-back: first the 4 x 4 triangle, row by row with its diagonal inverted, then the rows below it by
-sixteens, of each column in turn; zeros fill up the last sixteen.
+back: first the 4 x 4 triangle, row by row with its diagonal inverted, then the rows below it, of
+each column in turn, filled up with zeros to a multiple of sixteen.
 """
 # pyright: reportUntypedFunctionDecorator=false, reportUnknownVariableType=false
 # pyright: reportUnknownArgumentType=false, reportUnknownMemberType=false
@@ -24,7 +24,7 @@ from fras_sim.fem.linear.blas import CHOLESKY, call_routine
 
 # One pass over x for four columns of L: what is read from memory is L itself, once, in order.
 COLUMNS = 4
-# Fewer, and LLVM does not vectorise.
+# The compiler's vectors take so many rows at once: nothing is left over for a slower loop.
 ROWS = 16
 TRIANGLE = COLUMNS * COLUMNS
 GROUP = COLUMNS * ROWS
