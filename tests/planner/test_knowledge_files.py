@@ -9,7 +9,7 @@ from fras_planner.knowledge import load_knowledge
 from fras_planner.planning import Knowledge, KnowledgeFault, Planner, PlanningScene
 
 ASP = Path(__file__).resolve().parents[2] / "asp"
-MAX_LINES = 90
+MAX_LINES = 80
 
 
 @pytest.fixture

@@ -19,7 +19,9 @@ Fingerprint = Callable[[Knowledge], Iterator[object]]
 
 KNOWLEDGE = load_knowledge()
 # These word what the other files decide, or judge it.
-WORDING = ("explain.lp", "because.lp", "why_not_block.lp", "why_not_action.lp")
+WORDING = (
+    "explain.lp", "because.lp", "no_plan.lp", "words.lp", "why_not_block.lp", "why_not_action.lp"
+)  # fmt: skip
 JUDGING = ("verify.lp",)
 # Rules whose absence nothing shows, with the reason why they stay.
 EQUIVALENT: dict[str, str] = {
@@ -231,7 +233,7 @@ def occasions(knowledge: Knowledge) -> Iterator[object]:
 
 
 def explained(knowledge: Knowledge) -> Iterator[object]:
-    """All that is worded by `explain.lp`: plans, their absence, and the names of rules."""
+    """All that is worded: plans, their absence, and the names of rules."""
     yield from fingerprint(knowledge)
     yield from answers(knowledge)
     # Blocks that both arms reach, one of them with its gripper closed.
@@ -304,8 +306,8 @@ def test_rule_of_planning(mutant: Mutant) -> None:
 
 @every(file for file in WORDING if file in KNOWLEDGE.files)
 def test_rule_of_wording(mutant: Mutant) -> None:
-    takes = {"explain.lp": explained, "because.lp": occasions}
-    expect_death(takes.get(mutant.file, answers), mutant)
+    takes = {"because.lp": occasions, "why_not_block.lp": answers, "why_not_action.lp": answers}
+    expect_death(takes.get(mutant.file, explained), mutant)
 
 
 @every(file for file in JUDGING if file in KNOWLEDGE.files)

@@ -255,7 +255,7 @@ def test_every_rule_can_be_worded(knowledge: Knowledge) -> None:
     pool = re.search(r"^rule\(([^)]*)\)\.", knowledge.files["constraints.lp"], re.MULTILINE)
     assert pool is not None
     names = {name.strip() for name in pool.group(1).split(";")}
-    worded = re.findall(r"^text\((\w+),", knowledge.files["explain.lp"], re.MULTILINE)
+    worded = re.findall(r"^text\((\w+),", knowledge.files["words.lp"], re.MULTILINE)
     assert sorted(names) == sorted(worded)
 
 

@@ -1,6 +1,7 @@
 """Tells a finished plan: its actions by name, its history, its reasons in words.
 
-The rules for that (`history.lp`, `explain.lp`) run on one plan as facts, outside the search.
+The rules for that (`program.TELL_FILES` and those after it) run on one plan as facts, outside the
+search.
 """
 
 from collections import defaultdict
@@ -12,6 +13,7 @@ import clingo
 from fras_planner.planning.errors import KnowledgeFault
 from fras_planner.planning.plan import PlannedAction
 from fras_planner.planning.program import (
+    NO_PLAN_FILES,
     TELL_FILES,
     WHY_NOT_ACTION_FILES,
     WHY_NOT_BLOCK_FILES,
@@ -40,7 +42,9 @@ def tell_plan(knowledge: Knowledge, facts: Iterable[str], steps: int) -> Story:
     steps : int
         Steps of the plan, the last one included at which the goal holds.
     """
-    told = _told(knowledge, [*facts, f"step(1..{steps})"], ("history", "explain", "because"))
+    told = _told(
+        knowledge, [*facts, f"step(1..{steps})"], ("history", "explain", "because"), TELL_FILES
+    )
     expected: dict[int, list[str]] = defaultdict(list)
     for t, atom in told.rows("expected", 2):
         expected[t.number].append(str(atom))
@@ -69,7 +73,8 @@ def tell_no_plan(
 ) -> tuple[str, ...]:
     """Tell why there is no plan, from the scene's facts, the context and the core of rules."""
     blamed = [f"core({rule})" for rule in core]
-    return _sentences(knowledge, _told(knowledge, [*facts, *blamed], ("no_plan", "because")))
+    told = _told(knowledge, [*facts, *blamed], ("no_plan", "because"), NO_PLAN_FILES)
+    return _sentences(knowledge, told)
 
 
 def tell_why_not_block(
@@ -89,7 +94,7 @@ def _told(
     knowledge: Knowledge,
     facts: Iterable[str],
     parts: Sequence[str],
-    files: Sequence[str] = TELL_FILES,
+    files: Sequence[str],
 ) -> Program:
     program = Program(knowledge, files, ())
     program.ground(*((part, ()) for part in ("base", *parts)), facts=facts)

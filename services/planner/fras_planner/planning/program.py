@@ -12,8 +12,9 @@ from fras_planner.planning.signature import Alphabet
 
 PLAN_FILES = ("domain.lp", "target.lp", "actions.lp", "effects.lp", "constraints.lp", "goal.lp")
 TELL_FILES = ("history.lp", "explain.lp", "because.lp")
-WHY_NOT_BLOCK_FILES = ("explain.lp", "why_not_block.lp")
-WHY_NOT_ACTION_FILES = ("explain.lp", "why_not_action.lp")
+NO_PLAN_FILES = ("words.lp", "no_plan.lp", "because.lp")
+WHY_NOT_BLOCK_FILES = ("words.lp", "why_not_block.lp")
+WHY_NOT_ACTION_FILES = ("words.lp", "why_not_action.lp")
 VERIFY_FILES = ("verify.lp",)
 PREFERENCES = "preferences/"
 
