@@ -29,7 +29,8 @@ def test_the_choice_is_told_with_its_numbers(planner: Planner) -> None:
         "psm2 goes for b(2,2): no other arm reaches it.",
         "psm2 grasps b(2,2): 57 mm from the nearest attachment, 30 mm from the region of interest; "
         "best of 3 candidate blocks under the criterion 'weighted'.",
-        "psm2 pulls b(2,2) up to expose the region of interest.",
+        "psm2 pulls b(2,2) up to expose the region of interest: only where it may pull no higher "
+        "is tissue moved sideways.",
     )
 
 

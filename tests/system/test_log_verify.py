@@ -62,3 +62,15 @@ def test_a_log_that_is_damaged_or_cut_off_is_not_certified(trials: Any, tmp_path
         assert verify_log(path, None, Console(file=told, width=200)) == 1, name
         assert "all specifications kept" not in told.getvalue()
         assert "damaged" in told.getvalue()
+
+
+def test_an_action_that_no_executive_numbered_is_named(
+    trials: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _, log = trials.run("a")
+    trial = read_trial(log)
+    foreign = msgspec.structs.replace(trial.results[0], goal_id="mine")
+    forged = dataclasses.replace(trial, results=(foreign, *trial.results[1:]))
+    monkeypatch.setattr("fras_cli.log_verify.read_trial", lambda _: forged)
+    with pytest.raises(LogIncomplete, match="what led to action mine"):
+        verify_log(log, None, Console(file=io.StringIO()))

@@ -1,6 +1,7 @@
 """`fras log verify`: what a trial did against the safety specifications, from its log alone."""
 
 import importlib
+import re
 from pathlib import Path
 
 from rich.console import Console
@@ -9,7 +10,8 @@ from rich.markup import escape
 from fras_cli.report import Trial, read_trial
 from fras_cli.run import EXIT_NOT_SUCCESS
 from fras_common.errors import FrasError
-from fras_common.messages import ActionResult, Context, Plan
+from fras_common.executed import history_step
+from fras_common.messages import Plan
 from fras_common.service.extras import require_extra
 
 
@@ -56,7 +58,7 @@ def executed_history(trial: Trial) -> dict[int, list[str]]:
     contexts = {context.request_id: context for context in trial.contexts}
     history: dict[int, list[str]] = {}
     for result in trial.results:
-        number = int(result.goal_id.removeprefix("g"))
+        number = _number("g", result.goal_id)
         before = contexts.get(f"c{number}")
         plan = _plan_of(number, trial.plans)
         if before is None or plan is None:
@@ -64,18 +66,17 @@ def executed_history(trial: Trial) -> dict[int, list[str]]:
                 f"{trial.path}: what led to action {result.goal_id} is not in the log",
                 goal_id=result.goal_id,
             )
-        history[number] = _step(result, before, plan)
+        arguments = f"{result.arm},{result.block}" if result.block else result.arm
+        history[number] = history_step(f"{result.name}({arguments})", before, plan)
     return history
 
 
 def _plan_of(number: int, plans: tuple[Plan, ...]) -> Plan | None:
-    made = [plan for plan in plans if int(plan.request_id.removeprefix("c")) <= number]
+    made = [plan for plan in plans if 0 < _number("c", plan.request_id) <= number]
     return made[-1] if made else None
 
 
-def _step(result: ActionResult, before: Context, plan: Plan) -> list[str]:
-    arguments = f"{result.arm},{result.block}" if result.block else result.arm
-    options = [f"tried({block})" for block in plan.tried]
-    if plan.ignore_ap:
-        options.append("ignore_ap")
-    return [f"{result.name}({arguments})", *before.fluents, *options]
+def _number(kind: str, name: str) -> int:
+    """Return the number in a name of the executive's; 0 for another's."""
+    found = re.fullmatch(kind + "([0-9]+)", name)
+    return int(found[1]) if found else 0

@@ -14,6 +14,7 @@ import msgspec
 from fras_common.bus import NoAnswer
 from fras_common.codec import content_digest
 from fras_common.errors import FrasError
+from fras_common.executed import history_step
 from fras_common.messages import (
     ActionResult,
     CancelReply,
@@ -91,14 +92,6 @@ def reason_to_replan(ended: Ended) -> str:
         if (expected.removeprefix("-") in holds) != wanted:
             return f"deviation: {expected} expected after {ended.action.text}"
     return ""
-
-
-def history_step(action: str, plan: Plan, before: Context) -> list[str]:
-    """Return what was sensed and asked for before an action, and the action."""
-    options = [f"tried({block})" for block in plan.tried]
-    if plan.ignore_ap:
-        options.append("ignore_ap")
-    return [action, *before.fluents, *options]
 
 
 class TaskAborted(FrasError):
@@ -342,7 +335,7 @@ class Executive:
         if not reply.accepted:
             context = yield from self._context()
             return Ended(action, None, reply.reason, context)
-        self._done[self._goals] = history_step(action.text, plan, before)
+        self._done[self._goals] = history_step(action.text, before, plan)
         result: ActionResult = yield AwaitResult(goal_id)
         self._last_tick = result.tick
         yield from self._say(actions=[*self._status.actions, action.text])

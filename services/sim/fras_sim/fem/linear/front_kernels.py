@@ -231,6 +231,17 @@ def backward(packed: NDArray[Any], own: int, height: int, x: NDArray[Any]) -> No
         x[j], x[j + 1], x[j + 2], x[j + 3] = x0, x1, x2, x3
 
 
+@njit(inline="always")
+def _take(
+    x: NDArray[Any], first: int, own: int, height: int, border: Ints, local: NDArray[Any]
+) -> None:
+    """Put what of `x` belongs to a front into `local`, zeros behind it."""
+    local[:own] = x[first : first + own]
+    for i in range(len(border)):
+        local[own + i] = x[border[i]]
+    local[height : height + ROWS] = 0.0
+
+
 @njit(
     _for_both(
         "void(f8[::1], i8[::1], i8[::1], i8[:, ::1], i8[::1], real[::1], real[::1], real[::1])"
@@ -254,10 +265,7 @@ def all_forward(
     for k in range(len(fronts) - 1):
         first, own, height = fronts[k, FIRST], fronts[k, OWN], fronts[k, ALL]
         border = borders[fronts[k, BORDER] : fronts[k + 1, BORDER]]
-        local[:own] = x[first : first + own]
-        for i in range(len(border)):
-            local[own + i] = x[border[i]]
-        local[height : height + ROWS] = 0.0
+        _take(x, first, own, height, border, local)
         forward(packed[fronts[k, PACKED] : fronts[k + 1, PACKED]], own, height, local)
         x[first : first + own] = local[:own]
         for i in range(len(border)):
@@ -285,10 +293,7 @@ def all_backward(
     for k in range(len(fronts) - 2, -1, -1):
         first, own, height = fronts[k, FIRST], fronts[k, OWN], fronts[k, ALL]
         border = borders[fronts[k, BORDER] : fronts[k + 1, BORDER]]
-        local[:own] = x[first : first + own]
-        for i in range(len(border)):
-            local[own + i] = x[border[i]]
-        local[height : height + ROWS] = 0.0
+        _take(x, first, own, height, border, local)
         backward(packed[fronts[k, PACKED] : fronts[k + 1, PACKED]], own, height, local)
         x[first : first + own] = local[:own]
     for k in range(len(rows)):

@@ -56,7 +56,8 @@ class MultifrontalCholesky:
     @property
     def factor_bytes(self) -> int:
         """Size of the factor."""
-        return sum(part.factor_bytes for part in [*self._halves, *self._tops])
+        parts = self._halves if self._last is None else [*self._halves, self._last]
+        return sum(part.factor_bytes for part in parts)
 
     def factorize(self, values: NDArray[np.float64]) -> None:
         """Take new entries and factor."""
@@ -85,10 +86,6 @@ class MultifrontalCholesky:
                 half.separator[:] = solved[: len(half.separator)]
         self._of_both(lambda half: half.backward(answer), at_once=self._shares_solving)
         return answer
-
-    @property
-    def _tops(self) -> list[Part]:
-        return [] if self._last is None else [self._last]
 
     def _of_both(self, work: Callable[[Part], T], *, at_once: bool) -> list[T]:
         """Return what the work gives for either half, done at once if that is worth it."""
