@@ -48,6 +48,11 @@ def common(
 SERVICE_ARGUMENTS = {"allow_extra_args": True, "ignore_unknown_options": True}
 
 
+def _log_file(log: Path) -> Path:
+    """Return the log that a run's folder holds, or the file that was named."""
+    return log / "audit.mcap" if log.is_dir() else log
+
+
 def _console(as_json: bool = False) -> Console:
     return Console(stderr=as_json)
 
@@ -238,7 +243,7 @@ def report(
     from fras_cli.display import print_summary
     from fras_cli.report import write_report
 
-    path = log / "audit.mcap" if log.is_dir() else log
+    path = _log_file(log)
     folder = out or path.parent
     summary = write_report(path, folder)
     print_summary(_console(), summary, [("report", str(folder / "report.html"))])
@@ -267,7 +272,7 @@ def log_info(
     """List the keys of a log with counts and rates, and how the trial ended."""
     from fras_cli.log_info import print_info
 
-    print_info(log / "audit.mcap" if log.is_dir() else log, _console())
+    print_info(_log_file(log), _console())
 
 
 @log_app.command("verify")
@@ -280,8 +285,7 @@ def log_verify(
     """Hold what a trial did against the safety specifications."""
     from fras_cli.log_verify import verify_log
 
-    path = log / "audit.mcap" if log.is_dir() else log
-    raise typer.Exit(verify_log(path, asp_dir, _console()))
+    raise typer.Exit(verify_log(_log_file(log), asp_dir, _console()))
 
 
 @scenario_app.command("new")
