@@ -23,8 +23,8 @@ PAPER_S: dict[int, tuple[tuple[float, float], ...]] = {
 # Fewer sizes than this say nothing about growth.
 LEAST_SIZES = 2
 MEMORY_TARGET_MIB = 50e6 / 2**20
-# Less is what the allocator keeps.
-FLAT_MIB = 1.0
+# Of what is resident; clingo keeps the names that it has seen.
+FLAT_SHARE = 0.05
 Rows = dict[str, Any]
 Points = dict[int, float]
 
@@ -80,6 +80,7 @@ def criteria_table(result: dict[int, Rows], criteria: tuple[str, ...]) -> str:
         "search": "solve_ms",
         "warm p50": "warm_p50_ms",
         "p99": "warm_p99_ms",
+        "untold p50": "warm_plan_p50_ms",
         "search p50": "warm_search_p50_ms",
         "told p50": "told_p50_ms",
         "numpy": "numpy_ms",
@@ -128,10 +129,10 @@ def targets(
                 text = f"N = 10, {against[:4]}: >= {least} x the baseline's first plans ({variant})"
                 ratio = _first_plans(result[10], variant, criteria[0], against)
                 hold(text, ratio, lambda value, least=least: value >= least, "x")
-    # The search and, apart from it, the telling: history and reasons.
+    # The plan and, apart from it, the telling: history and reasons.
     limits = (
-        (7, "warm_search_p50_ms", "search for a warm plan, p50", 2),
-        (7, "warm_search_p99_ms", "search for a warm plan, p99", 10),
+        (7, "warm_plan_p50_ms", "a warm plan, not told, p50", 2),
+        (7, "warm_plan_p99_ms", "a warm plan, not told, p99", 10),
         (7, "warm_p99_ms", "a warm plan told, p99", 10),
         (10, "told_p50_ms", "history and reasons", 20),
         (40, "warm_p50_ms", "a warm plan told, p50", 20),
@@ -147,10 +148,13 @@ def targets(
             largest = max(n for n in result if n <= 20)
             text = f"up to N = {largest}, {criterion}: <= 50 MB (here MiB, peak growth)"
             hold(text, max(small), lambda value: value <= MEMORY_TARGET_MIB, "MiB")
-    # Names that clingo has seen it keeps: the first thousands of plans bring new ones.
-    half = flat["replans"] // 2
-    text = f"N = {flat['n']}: the last {half:,} warm plans grow by less than {FLAT_MIB:g} MiB"
-    hold(text, flat["last_half_mib"], lambda value: value < FLAT_MIB, "MiB")
+    # Each plan is told by a Control of its own, and clingo does not give all of one back.
+    text = (
+        f"N = {flat['n']}: {flat['replans']:,} warm plans grow by less than {FLAT_SHARE:.0%} "
+        "more than as many empty Controls"
+    )
+    grown = flat["growth_mib"] - flat["floor_mib"]
+    hold(text, grown, lambda value: value < FLAT_SHARE * flat["before_mib"], "MiB")
     for name, what, most in (
         ("why_not_p50_ms", "why not another", 15),
         ("core_p50_ms", "why no plan, with its minimal core", 10),

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import clingo
 import numpy as np
 from benchmarks import planner_baseline as baseline
 from benchmarks.memory import memory_mib
@@ -138,15 +139,15 @@ def _measure_cell(knowledge: Knowledge, n: int, cell: str, seed: int, criterion:
     }
 
 
-def _ask(planner: Planner, kind: str, rng: np.random.Generator) -> tuple[float, float]:
-    """Plan in a random state: seconds of the whole call, and of the search in it."""
+def _ask(planner: Planner, kind: str, rng: np.random.Generator) -> tuple[float, float, float]:
+    """Plan in a random state: seconds of the whole call, and of the search and telling in it."""
     state = make_state(kind, planner.scene, rng)
     began_s = time.perf_counter()
     plan = planner.plan(state.fluents, tried=state.tried)
     spent_s = time.perf_counter() - began_s
     if not plan.actions or not plan.optimal:
         raise RuntimeError(f"no best plan for {state}")
-    return spent_s, plan.solve_s
+    return spent_s, plan.solve_s, plan.told_s
 
 
 def _score(plan: Plan, scene: PlanningScene, scores: list[int]) -> int | None:
@@ -188,6 +189,18 @@ def measure_flatness(ready: Ready, n: int, replans: int) -> Raw:
         "first_p50_ms": percentile_ms(spent_s[SETTLE : SETTLE + tenth], 50),
         "last_p50_ms": percentile_ms(spent_s[-tenth:], 50),
     }
+
+
+def measure_floor(ready: Ready, controls: int) -> Raw:
+    """How far as many empty Controls raise it: clingo itself gives a little less back each time."""
+    ready()
+    used_mib: list[float] = []
+    for number in range(SETTLE + controls + 1):
+        if number in (SETTLE, SETTLE + controls):
+            gc.collect()
+            used_mib.append(memory_mib("VmRSS"))
+        clingo.Control([])
+    return {"mib": used_mib[1] - used_mib[0]}
 
 
 def measure_reasons(ready: Ready, n: int, steps: int) -> Raw:

@@ -6,6 +6,7 @@ rule; here it only has to change.
 
 from collections.abc import Callable, Iterable, Iterator
 from functools import cache
+from itertools import count
 
 import pytest
 
@@ -148,6 +149,8 @@ def fingerprint(knowledge: Knowledge) -> Iterator[object]:
         for state in states:
             yield outcome(planned, planner, state)
     yield Planner(knowledge, TISSUE, conflict_budget=0).plan([]).explanation
+    late = Planner(knowledge, TISSUE, clock=count(step=60.0).__next__)
+    yield late.plan([]).explanation
     for state in SMALL_STATES:
         yield courses(knowledge, state, best=False)
         yield courses(knowledge, state, best=True)

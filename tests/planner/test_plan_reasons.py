@@ -282,6 +282,55 @@ def test_a_spent_budget_is_said_without_blaming_a_rule(
     )
 
 
+class Watch:
+    """A clock that goes on by some seconds each time it is looked at."""
+
+    def __init__(self, step_s: float) -> None:
+        self.step_s = step_s
+        self.now_s = 0.0
+
+    def __call__(self) -> float:
+        self.now_s += self.step_s
+        return self.now_s
+
+
+def test_time_may_end_a_search_only_without_a_plan(
+    knowledge: Knowledge, scene: PlanningScene
+) -> None:
+    watch = Watch(6.0)
+    planner = Planner(knowledge, scene, clock=watch)
+    late = planner.plan([])
+    assert late.no_plan is not None
+    assert late.actions == ()
+    assert not late.optimal
+    assert late.no_plan.core == ("search_time",)
+    assert late.explanation == ("The time for planning was over before an answer was found.",)
+    watch.step_s = 0.0
+    assert planner.plan([]).actions == Planner(knowledge, scene).plan([]).actions
+
+
+def test_time_may_end_the_search_for_a_minimal_core(
+    knowledge: Knowledge, scene: PlanningScene
+) -> None:
+    watch = Watch(0.0)
+    planner = Planner(knowledge, scene, clock=watch)
+    proved = planner.plan([], tried=scene.names).no_plan
+    assert proved is not None
+    assert "try_once" in proved.core
+    watch.step_s = 2.0
+    late = planner.plan([], tried=scene.names).no_plan
+    assert late is not None
+    assert late.core == ("search_time",)
+
+
+def test_a_search_under_way_is_ended_in_time(knowledge: Knowledge, make_scene: SceneMaker) -> None:
+    # Without a clock each search may take the whole limit, here less than any search of this size.
+    planner = Planner(knowledge, make_scene(40, 1), time_limit_s=1e-5)
+    late = planner.plan([])
+    assert late.no_plan is not None
+    assert late.no_plan.core == ("search_time",)
+
+
 def test_a_small_budget_gives_the_best_plan_so_far(
     knowledge: Knowledge, make_scene: SceneMaker
 ) -> None:

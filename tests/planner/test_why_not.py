@@ -176,7 +176,7 @@ def test_a_spent_budget_decides_nothing(knowledge: Knowledge, scene: PlanningSce
     answer = Planner(knowledge, scene, conflict_budget=0).why_not("reach(psm2,b(2,2))", [])
     assert answer.rules == ()
     assert answer.sentences == (
-        "The search ended before that was decided: allow it more conflicts.",
+        "The search ended before that was decided: allow it more conflicts or more time.",
     )
 
 
@@ -242,3 +242,16 @@ def test_asking_changes_no_plan(knowledge: Knowledge, make_scene: SceneMaker) ->
                 assert answer.sentences == (f"{name} is what the plan grasps.",)
         assert planner.plan([]).actions == before.actions
         assert planner.plan([]).cost == before.cost
+
+
+def test_time_that_is_over_decides_nothing(knowledge: Knowledge, scene: PlanningScene) -> None:
+    in_time = Planner(knowledge, scene).why_not("reach(psm1,b(1,1))", [])
+    ticks = iter(range(0, 1000, 2))
+    # Enough for the plan, not for the other one beside it.
+    planner = Planner(knowledge, scene, time_limit_s=5.0, clock=lambda: float(next(ticks)))
+    late = planner.why_not("reach(psm1,b(1,1))", [])
+    assert late.rules == ()
+    assert late.sentences != in_time.sentences
+    assert late.sentences == (
+        "The search ended before that was decided: allow it more conflicts or more time.",
+    )

@@ -125,6 +125,7 @@ class PlanMaker:
                 scene,
                 criterion=self._section.criterion,
                 goal=self._section.goal,
+                time_limit_s=self._section.time_limit_s,
                 clock=self._clock,
             )
         return self._planner

@@ -133,12 +133,15 @@ class PlannerSection(Section, frozen=True, kw_only=True):
         The first plan grasps nearest the ROI, whatever holds the tissue there (scenario C).
     goal : {"visible", "clear"}
         `clear` also asks that no arm stands at its maximal height.
+    time_limit_s : float
+        Seconds of search after which a plan is given up.
     """
 
     criterion: Literal["sum", "literal", "lex", "nearest", "weighted"] = "weighted"
     goal: Literal["visible", "clear"] = "visible"
     ignore_ap: bool = False
     max_replans: Annotated[int, Meta(ge=0, le=100)] = 5
+    time_limit_s: Annotated[float, Meta(gt=0, le=600)] = 5.0
 
 
 class MotionSection(Section, frozen=True, kw_only=True):

@@ -2,12 +2,10 @@
 
 from collections.abc import Mapping, Sequence
 
-import clingo
+from fras_planner.planning.search import Search
 
 
-def minimal_core(
-    control: clingo.Control, rules: Mapping[str, int], given: Sequence[int] = ()
-) -> list[str]:
+def minimal_core(search: Search, rules: Mapping[str, int], given: Sequence[int] = ()) -> list[str]:
     """Find rules that leave no plan, none of which can be spared.
 
     The solver's own core is a first guess; each rule is then lifted in turn, and stays lifted if
@@ -15,8 +13,8 @@ def minimal_core(
 
     Parameters
     ----------
-    control : clingo.Control
-        Without a plan while all rules are assumed; not optimising.
+    search : Search
+        Of a Control without a plan while all rules are assumed; not optimising.
     rules : mapping of str to int
         Literal of `enforced(Rule)` by the rule's name.
     given : sequence of int
@@ -26,23 +24,26 @@ def minimal_core(
     -------
     list of str
         In alphabetical order. Empty if there is no plan even without any of the rules.
+
+    Raises
+    ------
+    OutOfTime
     """
-    core = sorted(_core(control, rules, list(rules), given) or [])
+    core = sorted(_core(search, rules, list(rules), given) or [])
     for rule in list(core):
         without = [other for other in core if other != rule]
-        smaller = _core(control, rules, without, given)
+        smaller = _core(search, rules, without, given)
         if smaller is not None:
             core = sorted(smaller)
     return core
 
 
 def _core(
-    control: clingo.Control, rules: Mapping[str, int], names: list[str], given: Sequence[int]
+    search: Search, rules: Mapping[str, int], names: list[str], given: Sequence[int]
 ) -> list[str] | None:
     """Rules blamed for there being no plan under `names`; None if there is one, or no proof."""
-    blamed: list[int] = []
     assumed = [*given, *(rules[name] for name in names)]
-    result = control.solve(assumed, on_core=blamed.extend)
+    result, blamed = search(assumed)
     if not result.unsatisfiable:
         return None
     return [name for name in names if rules[name] in blamed]

@@ -36,7 +36,8 @@ class NoPlan:
     ----------
     core : tuple of str
         Names of rules that together leave no plan; without any one of them there would be one.
-        `search_budget` alone: none was found, none was ruled out.
+        `search_budget` or `search_time` alone: the conflicts or the seconds allowed were spent
+        before a plan was found or ruled out.
     sentences : tuple of str
         The rules and the facts behind them, in words.
     """
@@ -60,8 +61,9 @@ class Plan:
         What the plan pays on each level of preference, highest first (see `target.lp`).
     models : int
         Plans that the solver found on the way, each better than the one before.
-    ground_s, solve_s : float
-        By the planner's clock; grounding is paid by the first plan of a scene.
+    ground_s, solve_s, told_s : float
+        By the planner's clock: grounding, paid by the first plan of a scene; the search; deriving
+        the history and the reasons.
     history : dict of int to tuple of str
         Every atom that holds at each step, the action taken at it among them: first those that
         change, then those of the scene.
@@ -79,6 +81,7 @@ class Plan:
     models: int
     ground_s: float
     solve_s: float
+    told_s: float
     history: dict[int, tuple[str, ...]]
     explanation: tuple[str, ...]
     no_plan: NoPlan | None = None

@@ -26,6 +26,7 @@ from fras_planner.planning.plan import NoPlan, Plan, WhyNot
 from fras_planner.planning.program import PLAN_FILES, Knowledge, Program
 from fras_planner.planning.scene import PlanningScene
 from fras_planner.planning.scene_facts import SceneFacts
+from fras_planner.planning.search import OutOfTime, Search
 from fras_planner.planning.signature import STATIC, normalised
 
 GOALS = ("visible", "clear")
@@ -33,6 +34,8 @@ GOALS = ("visible", "clear")
 HORIZON = 5
 MAX_HORIZON = 50
 CONFLICT_BUDGET = 200_000
+# A thousand times what a plan takes.
+TIME_LIMIT_S = 5.0
 # Actions of the block chosen for the next grasp (`actions.lp`).
 NEEDS_TARGET = ("reach", "grasp")
 
@@ -84,8 +87,11 @@ class Planner:
         Of the solver's random choices.
     conflict_budget : int
         Conflicts after which the search ends with the best plan so far.
+    time_limit_s : float
+        Seconds after which an answer's searches end without a plan.
     clock : callable, optional
-        Returns seconds; only for `ground_s` and `solve_s`, which are 0 without one.
+        Returns seconds, for `time_limit_s` and the times in a plan; without one these are 0, and
+        the limit is that of each search.
 
     Raises
     ------
@@ -102,6 +108,7 @@ class Planner:
         horizon: int = HORIZON,
         seed: int = 1,
         conflict_budget: int = CONFLICT_BUDGET,
+        time_limit_s: float = TIME_LIMIT_S,
         clock: Callable[[], float] = _no_clock,
     ) -> None:
         began = clock()
@@ -134,6 +141,7 @@ class Planner:
         parts = [("signature", ()), ("base", ()), *steps, ("check", (last,))]
         program.ground(*parts, facts=self._facts.all)
         self._control = program.control
+        self._search = Search(self._control, time_limit_s, clock)
         self._control.assign_external(clingo.Function("query", [clingo.Number(last)]), True)
         self._rules = {
             str(atom.symbol.arguments[0]): atom.literal
@@ -186,17 +194,28 @@ class Planner:
         self._assign(sensed)
         best = _Best()
         began = self._clock()
-        result = self._control.solve(self._assumptions, on_model=best.take)
+        self._search.begin()
+        try:
+            result, _ = self._search(self._assumptions, best.take)
+        except OutOfTime:
+            best, result = _Best(), None
         solve_s = self._clock() - began
         ground_s, self._ground_s = self._ground_s, 0.0
         if not best.models:
-            proved = bool(result.unsatisfiable)
-            none = self._why_none(sensed, occasion(reason, evidence or {}, sensed), proved=proved)
-            return Plan((), "", "", (), 0, ground_s, solve_s, {}, none.sentences, none, proved)
+            proved = result is not None and bool(result.unsatisfiable)
+            unproved = "search_time" if result is None else "search_budget"
+            why_now = occasion(reason, evidence or {}, sensed)
+            none = self._why_none(sensed, why_now, "" if proved else unproved)
+            told_s = self._clock() - began - solve_s
+            return Plan(
+                (), "", "", (), 0, ground_s, solve_s, told_s, {}, none.sentences, none, proved
+            )
         self._check_contradictions(best, sensed)
         steps = 1 + len(best.named("occurs"))
         about = [*self._facts_about(best, sensed, steps), *occasion(reason, evidence or {}, sensed)]
+        began = self._clock()
         story = tell_plan(self._knowledge, about, steps)
+        told_s = self._clock() - began
         arm, target = story.actions[0].args[0] if story.actions else "", ""
         for row in best.named("target"):
             arm, target = str(row[0]), str(row[1])
@@ -208,9 +227,10 @@ class Planner:
             models=best.models,
             ground_s=ground_s,
             solve_s=solve_s,
+            told_s=told_s,
             history={t: (*atoms, *self._facts.statics) for t, atoms in story.history.items()},
             explanation=story.explanation,
-            optimal=bool(result.exhausted),
+            optimal=result is not None and bool(result.exhausted),
         )
 
     def why_not(
@@ -286,17 +306,20 @@ class Planner:
         if len(given) < len(wanted):
             return [], []
         best = _Best()
-        result = self._control.solve([*given, *self._assumptions], on_model=best.take)
-        if not best.models and not result.unsatisfiable:
+        try:
+            result, _ = self._search([*given, *self._assumptions], best.take)
+            if not best.models and not result.unsatisfiable:
+                return [], ["undecided"]
+            if best.models:
+                prices = zip(best.levels, best.cost, plan.cost or best.cost, strict=True)
+                worse = next(((level, by - of) for level, by, of in prices if by != of), None)
+                return [], ["possible", *([f"worse({worse[0]},{worse[1]})"] if worse else [])]
+            with self._any_model():
+                if self._search(given)[0].unsatisfiable:
+                    return [], []
+                return minimal_core(self._search, self._rules, given), []
+        except OutOfTime:
             return [], ["undecided"]
-        if best.models:
-            prices = zip(best.levels, best.cost, plan.cost or best.cost, strict=True)
-            worse = next(((level, by - of) for level, by, of in prices if by != of), None)
-            return [], ["possible", *([f"worse({worse[0]},{worse[1]})"] if worse else [])]
-        with self._any_model():
-            if self._control.solve(given).unsatisfiable:
-                return [], []
-            return minimal_core(self._control, self._rules, given), []
 
     @contextmanager
     def _any_model(self) -> Generator[None]:
@@ -356,14 +379,18 @@ class Planner:
             f"count(actions,{actions})",
         ]
 
-    def _why_none(self, sensed: Sensed, why_now: list[str], *, proved: bool) -> NoPlan:
-        core = ["search_budget"]
+    def _why_none(self, sensed: Sensed, why_now: list[str], unproved: str) -> NoPlan:
+        """Say why there is no plan; `unproved`: what ended the search before that was proved."""
+        core = [unproved]
         best = _Best()
-        with self._any_model():
-            # Without any rule there is always a model; it tells contradictions and candidates.
-            self._control.solve(on_model=best.take)
-            self._check_contradictions(best, sensed)
-            if proved:
-                core = minimal_core(self._control, self._rules)
+        try:
+            with self._any_model():
+                # Without any rule there is always a model; it tells contradictions and candidates.
+                self._search(on_model=best.take)
+                self._check_contradictions(best, sensed)
+                if not unproved:
+                    core = minimal_core(self._search, self._rules)
+        except OutOfTime:
+            core = ["search_time"]
         facts = [*self._facts.all, *sensed, *why_now, *self._counts(best, self._horizon)]
         return NoPlan(tuple(core), tell_no_plan(self._knowledge, facts, core))

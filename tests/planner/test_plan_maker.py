@@ -1,0 +1,34 @@
+"""Planning from messages: what the scenario says reaches the core."""
+
+from itertools import count
+
+import pytest
+
+from fras_common.messages import Context
+from fras_common.scenario import PlannerSection, Scenario
+from fras_planner.adapter import PlanMaker
+from fras_planner.executive import PlanRequest
+from fras_planner.planning import Knowledge
+
+CONTEXT = Context(
+    trial="t",
+    tick=3,
+    request_id="c1",
+    fluents=["reachable(psm1,b(1,1))", "reachable(psm1,b(1,2))", "above_roi(b(1,2))"],
+    evidence={},
+    names=["b(1,1)", "b(1,2)"],
+    blocks_m=[(0.02, 0.02, 0.005), (0.02, 0.04, 0.005)],
+    roi_m=(0.02, 0.04, 0.0),
+    fixed_points_m=[],
+)
+REQUEST = PlanRequest(request_id="c1", reason="initial", ignore_ap=False, tried=())
+
+
+@pytest.mark.parametrize(("limit_s", "core"), [(100.0, None), (1.0, ["search_time"])])
+def test_a_plan_is_given_up_after_the_time_of_the_scenario(
+    knowledge: Knowledge, limit_s: float, core: list[str] | None
+) -> None:
+    scenario = Scenario(planner=PlannerSection(time_limit_s=limit_s))
+    plan = PlanMaker(knowledge, scenario, count(step=2.0).__next__)(CONTEXT, REQUEST)
+    assert (plan.no_plan.core if plan.no_plan else None) == core
+    assert bool(plan.actions) == (core is None)
