@@ -22,6 +22,9 @@ app.add_typer(scenario_app, name="scenario")
 
 Cell = Annotated[str, typer.Option(help="Cell: stacks of different cells don't hear each other.")]
 AspDir = Annotated[Path | None, typer.Option(help="Rules of your own, laid out like asp/.")]
+Compose = Annotated[
+    str, typer.Option(help="Processes of an own stack: local, crtk, or a file like theirs.")
+]
 Connect = Annotated[
     str | None, typer.Option(help="Endpoint of a router whose stack to use, tcp/HOST:PORT.")
 ]
@@ -88,6 +91,7 @@ def run(
         bool, typer.Option("--json", help="Print the summary as JSON on standard output.")
     ] = False,
     asp_dir: AspDir = None,
+    compose: Compose = "local",
     cell: Cell = "local",
     connect: Connect = None,
     port: Annotated[
@@ -97,6 +101,7 @@ def run(
     """Run a trial: the stack of `fras up` if there is one in the cell, else an own one."""
     from fras_cli.options import build_trial, choose_seeds
     from fras_cli.run import default_out, run_trials
+    from fras_cli.stack import Layout
 
     chosen = choose_seeds(seed, seeds)
     trials = [
@@ -122,7 +127,7 @@ def run(
             port=port,
             console=_console(json),
             as_json=json,
-            asp_dir=asp_dir,
+            layout=Layout(compose, asp_dir),
         )
     )
 
@@ -135,12 +140,14 @@ def up(
         Path | None, typer.Option(help="Folder of the logs.", show_default="runs/up-<cell>/logs")
     ] = None,
     asp_dir: AspDir = None,
+    compose: Compose = "local",
 ) -> None:
     """Start the stack and keep it, for `fras run` and for clients of your own."""
     from fras_cli.keep import up
+    from fras_cli.stack import Layout
 
     folder = logs or Path("runs") / f"up-{cell}" / "logs"
-    raise typer.Exit(up(cell, port, folder, _console(), asp_dir))
+    raise typer.Exit(up(cell, port, folder, _console(), Layout(compose, asp_dir)))
 
 
 @app.command()
@@ -315,6 +322,13 @@ def scenario_check(
     _console().print(f"{scenario}: fine; seed {checked.seed}, {mesh}")
 
 
+# Extra and module of what is not `fras_<name>`.
+_MODULES = {
+    "router": ("router", "fras_common.router"),
+    "arms": ("motion", "fras_motion.arms_main"),
+}
+
+
 def _service(name: str, help_text: str) -> None:
     """Register `fras <name>`: the service's own main, with its own arguments."""
 
@@ -324,8 +338,8 @@ def _service(name: str, help_text: str) -> None:
 
         from fras_common.service.extras import require_extra
 
-        module = "fras_common.router" if name == "router" else f"fras_{name}.__main__"
-        with require_extra(name):
+        extra, module = _MODULES.get(name, (name, f"fras_{name}.__main__"))
+        with require_extra(extra):
             main = importlib.import_module(module).main
         raise typer.Exit(main(context.args))
 
@@ -337,7 +351,8 @@ for _name, _help in {
     "sim": "Run the tissue simulator.",
     "sa": "Run situation awareness.",
     "planner": "Run the planner and its executive.",
-    "motion": "Run motion with simulated arms.",
+    "motion": "Run motion.",
+    "arms": "Play two arms under CRTK's keys, for `fras motion --driver crtk`.",
     "recorder": "Run the recorder.",
 }.items():
     _service(_name, _help)

@@ -13,7 +13,7 @@ from rich.table import Table
 from fras_cli import runtime
 from fras_cli.link import Link
 from fras_cli.run import EXIT_OK, EXIT_STACK, caught_interrupts
-from fras_cli.stack import own_stack
+from fras_cli.stack import USUAL, Layout, own_stack
 from fras_common.errors import FrasError
 from fras_common.messages import (
     Health,
@@ -37,7 +37,7 @@ class DownTimeout(FrasError):
     """The stack did not end in time."""
 
 
-def up(cell: str, port: int, log_dir: Path, console: Console, asp_dir: Path | None = None) -> int:
+def up(cell: str, port: int, log_dir: Path, console: Console, layout: Layout = USUAL) -> int:
     """Start a stack and keep it until Ctrl-C, `fras down`, or the death of a process."""
     connect = f"tcp/127.0.0.1:{port}"
     record = runtime.keep(cell, connect, log_dir)
@@ -55,7 +55,7 @@ def up(cell: str, port: int, log_dir: Path, console: Console, asp_dir: Path | No
                 cancelled=stopping,
                 echo=echo,
                 tell=console.print,
-                asp_dir=asp_dir,
+                layout=layout,
             )
             with started as stack:
                 console.print(

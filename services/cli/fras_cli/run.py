@@ -14,7 +14,7 @@ from rich.console import Console
 
 from fras_cli.display import LiveDisplay, print_summary
 from fras_cli.report import Summary, write_report
-from fras_cli.stack import UsedStack, use_stack
+from fras_cli.stack import USUAL, Layout, UsedStack, use_stack
 from fras_cli.trial import StackDied, TrialFollower
 from fras_common.bus import NoAnswer
 from fras_common.errors import FrasError
@@ -97,7 +97,7 @@ def run_trials(
     console: Console,
     as_json: bool,
     mesh: bytes = b"",
-    asp_dir: Path | None = None,
+    layout: Layout = USUAL,
 ) -> int:
     """Run the scenarios one after the other through one stack.
 
@@ -115,8 +115,8 @@ def run_trials(
         Print the summaries to standard output, one JSON object a trial.
     mesh : bytes
         Content of the mesh file that the scenarios name.
-    asp_dir : Path, optional
-        Rules for the planner, other than those that came with FRAS.
+    layout : Layout
+        What an own stack consists of.
 
     Returns
     -------
@@ -136,7 +136,7 @@ def run_trials(
             out / "logs",
             cancelled=lambda: interrupts.count > 0,
             tell=lambda words: console.print(words, style="dim"),
-            asp_dir=asp_dir,
+            layout=layout,
         ) as stack,
     ):
         follower = TrialFollower(stack)

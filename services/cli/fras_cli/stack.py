@@ -9,7 +9,7 @@ from pathlib import Path
 from fras_cli import runtime
 from fras_cli.link import Link
 from fras_common.errors import FrasError
-from fras_supervisor import Endpoint, Exit, Stack, find_table, free_port, load_table
+from fras_supervisor import Endpoint, Exit, Stack, Table, find_table, free_port, load_table
 from fras_supervisor.logs import Echo
 
 COMPLETE_TIMEOUT_S = 5.0
@@ -18,7 +18,44 @@ PATIENCE_S = 3.0
 
 
 class OtherRules(FrasError):
-    """Rules were given for a stack that has its own. Attributes: ``cell``."""
+    """Rules or processes were asked for of a stack that has its own. Attributes: ``cell``."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What an own stack consists of.
+
+    Attributes
+    ----------
+    compose : str
+        Process table: `compose/<name>.toml`, or a file.
+    asp_dir : Path or None
+        Rules for the planner other than those that came with FRAS.
+    """
+
+    compose: str = "local"
+    asp_dir: Path | None = None
+
+    def table(self) -> Table:
+        """Read the process table.
+
+        Raises
+        ------
+        TableError
+        """
+        path = Path(self.compose)
+        table = load_table(path if path.suffix == ".toml" else find_table(self.compose))
+        if self.asp_dir is not None:
+            table = table.with_arguments("planner", "--asp-dir", str(self.asp_dir.resolve()))
+        return table
+
+    def in_words(self) -> str:
+        """Options that ask for it; empty for the usual one."""
+        asked = [] if self.compose == "local" else [f"--compose {self.compose}"]
+        return " ".join([*asked, *([f"--asp-dir {self.asp_dir}"] if self.asp_dir else [])])
+
+
+USUAL = Layout()
 
 
 class StackIncomplete(FrasError):
@@ -90,7 +127,7 @@ def own_stack(
     cancelled: Callable[[], bool] = lambda: False,
     echo: Echo | None = None,
     tell: Callable[[str], None] | None = None,
-    asp_dir: Path | None = None,
+    layout: Layout = USUAL,
 ) -> Generator[UsedStack]:
     """Start a stack, and stop it whatever happens.
 
@@ -106,14 +143,17 @@ def own_stack(
         Gets each line that a service logs.
     tell : callable, optional
         Gets who is waited for, in words, when the start takes long.
-    asp_dir : Path, optional
-        Rules for the planner other than those that came with FRAS.
+    layout : Layout
+        What it consists of.
+
+    Raises
+    ------
+    TableError
+        The process table is not to be used.
     """
+    table = layout.table()
     started_ns = time.time_ns()
     endpoint = connect or f"tcp/127.0.0.1:{free_port()}"
-    table = load_table(find_table("local"))
-    if asp_dir is not None:
-        table = table.with_arguments("planner", "--asp-dir", str(asp_dir.resolve()))
     with Link(cell, endpoint) as link:
         watched = told_when_slow(link, cancelled, tell) if tell else cancelled
         stack = Stack(table, cell, endpoint, log_dir, link.tokens, cancelled=watched, echo=echo)
@@ -175,7 +215,7 @@ def use_stack(
     log_dir: Path,
     cancelled: Callable[[], bool],
     tell: Callable[[str], None],
-    asp_dir: Path | None = None,
+    layout: Layout = USUAL,
 ) -> Generator[UsedStack]:
     """Use the stack at `connect`, else the one that `fras up` keeps in `cell`, else an own one.
 
@@ -192,22 +232,22 @@ def use_stack(
         True ends the start of an own stack.
     tell : callable
         Gets which of them it is, in words.
-    asp_dir : Path, optional
-        Rules for the planner of an own stack.
+    layout : Layout
+        What an own stack consists of.
 
     Raises
     ------
     OtherRules
-        If there are rules for a stack that has started already.
+        If a stack that has started already is to be another one.
     """
     runtime.record_path(cell)  # a name that can't be one is refused before anything starts
     if connect is not None:
         Endpoint.parse(connect)
     kept = runtime.find(cell) if connect is None and port is None else None
-    if asp_dir is not None and (connect is not None or kept is not None):
+    if layout != USUAL and (connect is not None or kept is not None):
         raise OtherRules(
-            f"the stack of cell {cell} has its rules already: leave out --asp-dir, or start it "
-            f"with `fras up --asp-dir {asp_dir}`",
+            f"the stack of cell {cell} runs already: leave out {layout.in_words()}, or start it "
+            f"with `fras up {layout.in_words()}`",
             cell=cell,
         )
     if connect is not None:
@@ -221,5 +261,5 @@ def use_stack(
     else:
         tell("starting the services")
         endpoint = f"tcp/127.0.0.1:{port}" if port is not None else None
-        with own_stack(cell, endpoint, log_dir, cancelled, tell=tell, asp_dir=asp_dir) as used:
+        with own_stack(cell, endpoint, log_dir, cancelled, tell=tell, layout=layout) as used:
             yield used

@@ -22,8 +22,11 @@ class Qos(StrEnum):
     never blocking, because one frozen subscriber would stop the loop for everyone.
     EVENT: the same, and the last value is kept for whoever comes later (latched).
     TELEMETRY: best effort; the next one replaces a lost one.
+    COMMAND: reliable, but never kept: what was told to an arm before it listened, or while the
+    network was cut, must not move it later.
     """
 
+    COMMAND = "command"
     STATE = "state"
     EVENT = "event"
     TELEMETRY = "telemetry"
@@ -35,6 +38,8 @@ class Topic(Generic[M]):
 
     Attributes
     ----------
+    producer : str
+        A service; `*`: each of them; `arms`: whoever drives the robot; `client`: anyone.
     in_trial : bool
         Belongs to a trial: a service drops and counts it outside the trial of its last reset.
     """
@@ -97,6 +102,117 @@ FAULT = Topic(
 )
 RPC = Topic("rpc/{service}/{name}", m.RpcRecord, "*", Qos.STATE, "each query", in_trial=False)
 
+ARMS: tuple[str, ...] = ("psm1", "psm2")
+
+
+@dataclass(frozen=True)
+class ArmTopics:
+    """An arm's keys by CRTK: what it says, and what it can be told.
+
+    Attributes
+    ----------
+    arm : str
+        First chunk of each key.
+    """
+
+    arm: str
+
+    @property
+    def measured_js(self) -> Topic[m.JointState]:
+        """Joints as measured."""
+        return self._said("measured_js", m.JointState)
+
+    @property
+    def setpoint_js(self) -> Topic[m.JointState]:
+        """Joints as last sent to the servos."""
+        return self._said("setpoint_js", m.JointState)
+
+    @property
+    def measured_cp(self) -> Topic[m.TipState]:
+        """Tip by the measured joints."""
+        return self._said("measured_cp", m.TipState)
+
+    @property
+    def setpoint_cp(self) -> Topic[m.TipState]:
+        """Tip by the setpoint."""
+        return self._said("setpoint_cp", m.TipState)
+
+    @property
+    def jaw_measured_js(self) -> Topic[m.JawState]:
+        """Jaw as measured."""
+        return self._said("jaw/measured_js", m.JawState)
+
+    @property
+    def jaw_setpoint_js(self) -> Topic[m.JawState]:
+        """Jaw as last sent to its servo."""
+        return self._said("jaw/setpoint_js", m.JawState)
+
+    @property
+    def operating_state(self) -> Topic[m.OperatingState]:
+        """State of the state machine."""
+        return Topic(
+            f"{self.arm}/operating_state",
+            m.OperatingState,
+            "arms",
+            Qos.EVENT,
+            "each change, 2 Hz",
+            in_trial=False,
+        )
+
+    @property
+    def state_command(self) -> Topic[m.StateCommand]:
+        """Ask the state machine for a transition."""
+        return self._told("state_command", m.StateCommand)
+
+    @property
+    def servo_jp(self) -> Topic[m.ServoJoints]:
+        """Joints at once."""
+        return self._told("servo_jp", m.ServoJoints)
+
+    @property
+    def servo_cp(self) -> Topic[m.TipCommand]:
+        """Tip at once."""
+        return self._told("servo_cp", m.TipCommand)
+
+    @property
+    def move_cp(self) -> Topic[m.TipCommand]:
+        """Tip along a straight line."""
+        return self._told("move_cp", m.TipCommand)
+
+    @property
+    def jaw_servo_jp(self) -> Topic[m.ServoJaw]:
+        """Jaw at once."""
+        return self._told("jaw/servo_jp", m.ServoJaw)
+
+    @property
+    def all(self) -> tuple[Topic[Any], ...]:
+        """Every key of the arm."""
+        return (
+            self.measured_js,
+            self.measured_cp,
+            self.setpoint_js,
+            self.setpoint_cp,
+            self.jaw_measured_js,
+            self.jaw_setpoint_js,
+            self.operating_state,
+            self.state_command,
+            self.servo_jp,
+            self.servo_cp,
+            self.move_cp,
+            self.jaw_servo_jp,
+        )
+
+    def _said(self, name: str, kind: type[M]) -> Topic[M]:
+        key = f"{self.arm}/{name}"
+        return Topic(key, kind, "arms", Qos.STATE, "up to 100 Hz in motion, 2 Hz", in_trial=False)
+
+    def _told(self, name: str, kind: type[M]) -> Topic[M]:
+        key = f"{self.arm}/{name}"
+        return Topic(key, kind, "client", Qos.COMMAND, "on request", in_trial=False)
+
+
+CRTK: tuple[ArmTopics, ...] = tuple(ArmTopics(arm) for arm in ARMS)
+
 TOPICS: tuple[Topic[Any], ...] = (
     TISSUE_MODEL,
     TISSUE_STATE,
@@ -112,6 +228,7 @@ TOPICS: tuple[Topic[Any], ...] = (
     LOG,
     FAULT,
     RPC,
+    *(topic for arm in CRTK for topic in arm.all),
 )
 
 TASK = Query("planner/task", m.TaskRequest, m.TaskReply, "planner")

@@ -11,7 +11,11 @@ def main(argv: list[str] | None = None) -> int:
     from fras_common.service import run_service
 
     return run_service(
-        "motion", "fras_motion.service:MotionService", argv, "Move the arms, tick by tick."
+        "motion",
+        "fras_motion.service:MotionService",
+        argv,
+        "Move the arms, tick by tick.",
+        choices={"driver": ("simulated", "crtk")},
     )
 
 

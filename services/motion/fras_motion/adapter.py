@@ -1,5 +1,7 @@
 """Between messages and the motion controller."""
 
+from collections.abc import Callable
+from dataclasses import replace
 from typing import cast
 
 from fras_common import messages as m
@@ -26,6 +28,10 @@ def parameters_of(scenario: Scenario) -> MotionParameters:
         clearance_height_m=motion.clearance_height_m,
         retreat_max_m=motion.retreat_max_m,
         driver_time_constant_s=motion.joint_time_constant_s,
+        driver_delay_s=motion.joint_delay_s,
+        driver_noise_rad=motion.joint_noise_rad,
+        driver_noise_m=motion.insertion_noise_m,
+        driver_seed=scenario.seed,
     )
 
 
@@ -47,13 +53,18 @@ def verdict_of(verdict: m.Verdict) -> Verdict:
     )
 
 
-def robot_state(snapshot: Snapshot, trial: str) -> m.RobotState:
-    """Put the robot at one tick on the wire."""
+def robot_state(
+    snapshot: Snapshot, trial: str, operating_state: Callable[[str], str]
+) -> m.RobotState:
+    """Put the robot at one tick on the wire; `operating_state` knows an arm's state by CRTK."""
     action = snapshot.action
     return m.RobotState(
         tick=snapshot.tick,
         trial=trial,
-        arms={name: _arm_state(arm) for name, arm in snapshot.arms.items()},
+        arms={
+            name: _arm_state(replace(arm, operating_state=operating_state(name)))
+            for name, arm in snapshot.arms.items()
+        },
         action=m.ActionState(
             goal_id=action.goal_id,
             name=action.name,

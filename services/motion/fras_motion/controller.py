@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from math import isfinite
 
-from fras_motion.drivers import Driver, Measured, Setpoint, SimulatedDriver
+from fras_motion.drivers import Driver, DriverFault, Measured
 from fras_motion.kinematics import BASES_IN_WORLD, HOME_TIPS_M, ArmKinematics, Pose, Unreachable
 from fras_motion.safety import GATES, Gate, GateRefused, Step
 from fras_motion.trajectory import ProfileImpossible
@@ -16,6 +16,7 @@ from .errors import NoTickWanted, Refused, StaleVerdict
 from .parameters import MotionParameters
 from .primitives import PRIMITIVES, Posture
 from .rehearsal import rehearse
+from .robots import home_setpoints, simulated_drivers
 from .states import ActionResult, ActionState, Advance, ArmState, Goal, Snapshot, Verdict
 
 __all__ = ["MotionController"]
@@ -55,15 +56,8 @@ class MotionController:
         self._gates = gates
         self._bounds = p.bounds
         self.arms = {name: ArmKinematics(base) for name, base in bases_in_world.items()}
-        noise = (p.driver_time_constant_s, p.driver_noise_rad, p.driver_noise_m)
-        self._drivers = drivers or {
-            name: SimulatedDriver(*noise, seed=p.driver_seed + number)
-            for number, name in enumerate(self.arms)
-        }
-        self._home = {
-            name: Setpoint(arm.inverse(Pose(home_tips_m[name], arm.tool_down_xyzw)), p.jaw_open_rad)
-            for name, arm in self.arms.items()
-        }
+        self._drivers = drivers or simulated_drivers(p, self.arms)
+        self._home = home_setpoints(self.arms, home_tips_m, p)
         self._holds: dict[str, str] = {}
         self.reset()
 
@@ -102,6 +96,11 @@ class MotionController:
             action=action,
             holds=dict(sorted(self._holds.items())),
         )
+
+    @property
+    def drivers(self) -> Mapping[str, Driver]:
+        """The robots, by arm."""
+        return self._drivers
 
     @property
     def wants_tick(self) -> bool:
@@ -233,8 +232,14 @@ class MotionController:
             holding = {name for name, arm in self._measured.items() if self._closed(arm)}
             self._latched |= holding or {course.goal.arm}
         progress = self._checked(course, verdict)
-        for name, driver in self._drivers.items():
-            self._measured[name] = driver.servo(self._setpoints[name], self._parameters.dt_s)
+        try:
+            for name, driver in self._drivers.items():
+                driver.send(self._setpoints[name])
+            for name, driver in self._drivers.items():
+                self._measured[name] = driver.measure(self._parameters.dt_s)
+        except DriverFault as fault:
+            ending = Ending("aborted", f"hold:{fault.whose}")
+            progress = replace(progress, phase="interrupted", ending=ending)
         self._remember_grasp(course.goal.arm)
         tick = self._last.tick + 1
         self._last = self._observe(tick, _action(course.goal, progress.phase), verdict.tick)

@@ -12,7 +12,13 @@ from .errors import InvalidParameter
 
 __all__ = ["MotionParameters"]
 
-_MAY_BE_ZERO = ("driver_time_constant_s", "driver_noise_rad", "driver_noise_m", "driver_seed")
+_MAY_BE_ZERO = (
+    "driver_time_constant_s",
+    "driver_delay_s",
+    "driver_noise_rad",
+    "driver_noise_m",
+    "driver_seed",
+)
 _ANY_SIGN = ("jaw_open_rad", "jaw_closed_rad", "jaw_closed_below_rad")
 
 
@@ -50,7 +56,7 @@ class MotionParameters:
         Longest retreat.
     retreat_force_ratio : float
         A retreat ends at this share of the force limit.
-    driver_time_constant_s, driver_noise_rad, driver_noise_m, driver_seed
+    driver_time_constant_s, driver_delay_s, driver_noise_rad, driver_noise_m, driver_seed
         The simulated arms, see `fras_motion.drivers.SimulatedDriver`; psm2 has the next seed.
     workspace_lower_m, workspace_upper_m : tuple of float, length 3
         Corners of the box the tips stay in, world frame.
@@ -76,6 +82,7 @@ class MotionParameters:
     retreat_max_m: float = 0.005
     retreat_force_ratio: float = 0.95
     driver_time_constant_s: float = 0.01
+    driver_delay_s: float = 0.0
     driver_noise_rad: float = 0.0
     driver_noise_m: float = 0.0
     driver_seed: int = 0

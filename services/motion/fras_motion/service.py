@@ -16,6 +16,7 @@ from fras_common.topics import (
     VERDICT,
 )
 from fras_motion.adapter import action_result, goal_of, parameters_of, robot_state, verdict_of
+from fras_motion.arm_access import ArmAccess, remote_arms, simulated_arms
 from fras_motion.errors import Refused
 from fras_motion.holds import Holds
 from fras_motion.pacing import Pacer
@@ -24,11 +25,21 @@ from fras_motion.peers import Peers
 from fras_motion.states import ActionResult
 from fras_motion.trial import MotionTrial
 
+SIMULATED = "simulated"
+ARM_ACCESS = {SIMULATED: simulated_arms, "crtk": remote_arms}
+
 
 class MotionService:
-    """Turns accepted actions into ticks, one verdict at a time."""
+    """Turns accepted actions into ticks, one verdict at a time.
 
-    def __init__(self, host: ServiceHost) -> None:
+    Parameters
+    ----------
+    host : ServiceHost
+    driver : str
+        `simulated`, or `crtk` for arms that another process drives.
+    """
+
+    def __init__(self, host: ServiceHost, driver: str = SIMULATED) -> None:
         self._host = host
         self._holds = Holds()
         self._trial: MotionTrial | None = None
@@ -37,6 +48,8 @@ class MotionService:
         self._pacer = Pacer(dt_s=0.0, pace=0.0)
         self._patience = Patience(peer_timeout_s=0.0, hold_timeout_s=0.0)
         self._peers = Peers(host)
+        make_arms = ARM_ACCESS[driver]
+        self._arms: ArmAccess = make_arms(host, self._holds)
         self._state = host.publisher(ROBOT_STATE)
         self._result = host.publisher(ACTION_RESULT)
         host.subscribe(VERDICT, self._on_verdict)
@@ -48,7 +61,9 @@ class MotionService:
 
     def _reset(self, request: m.ResetRequest) -> m.ResetReply:
         scenario = request.scenario
-        trial = MotionTrial(request.trial, parameters_of(scenario), self._holds)
+        parameters = parameters_of(scenario)
+        drivers = self._arms.drivers(parameters, scenario.run.pace)
+        trial = MotionTrial(request.trial, parameters, self._holds, drivers)
         if self._trial is not None:
             self._finish(self._trial, self._trial.end("reset"))
         self._trial = trial
@@ -90,6 +105,11 @@ class MotionService:
 
     def wake(self) -> float | None:
         """Do the next tick if it is due; else see whether something has been missing too long."""
+        wait_s = self._wake_trial()
+        wait_arms_s = self._arms.wake(self._trial, time.monotonic())
+        return wait_arms_s if wait_s is None else min(wait_s, wait_arms_s)
+
+    def _wake_trial(self) -> float | None:
         self._host.facts["holds"] = self._holds.in_words()
         trial, now_s = self._trial, time.monotonic()
         if trial is not None and trial.impose_holds():
@@ -135,7 +155,9 @@ class MotionService:
 
     def _publish(self, trial: MotionTrial) -> None:
         self._host.tick = trial.tick
-        self._state.put(robot_state(trial.controller.snapshot, trial.name))
+        self._state.put(
+            robot_state(trial.controller.snapshot, trial.name, self._arms.operating_state)
+        )
 
     def _finish(self, trial: MotionTrial, result: ActionResult | None) -> None:
         if result is not None and trial.goal is not None:

@@ -1,8 +1,10 @@
 """One trial's worth of motion: its goals, taken until it is cancelled, and what holds the arms."""
 
+from collections.abc import Mapping
 from typing import Final
 
 from fras_motion.controller import MotionController
+from fras_motion.drivers import Driver
 from fras_motion.errors import Refused
 from fras_motion.holds import Holds
 from fras_motion.parameters import MotionParameters
@@ -22,15 +24,28 @@ class MotionTrial:
     parameters : MotionParameters
     holds : Holds
         What others hold; it outlives the trial.
+    drivers : mapping of str to Driver, optional
+        The robots; simulated ones by default.
     """
 
-    def __init__(self, name: str, parameters: MotionParameters, holds: Holds) -> None:
+    def __init__(
+        self,
+        name: str,
+        parameters: MotionParameters,
+        holds: Holds,
+        drivers: Mapping[str, Driver] | None = None,
+    ) -> None:
         self.name = name
-        self.controller = MotionController(parameters)
+        self.controller = MotionController(parameters, drivers=drivers)
         self.goal: Goal | None = None
         self._holds = holds
         self._open = True
         self.impose_holds()
+
+    @property
+    def runs(self) -> bool:
+        """Whether it may still move the arms; nobody else does then."""
+        return self._open or self.goal is not None
 
     @property
     def tick(self) -> int:

@@ -229,7 +229,7 @@ class MemoryBus:
         """Deliver a sample to whoever subscribed, and cache it as its QoS class says."""
         self._require_open()
         with self._fabric.lock:
-            if topic.qos is not Qos.TELEMETRY:
+            if topic.qos in (Qos.STATE, Qos.EVENT):
                 slot = (id(self), sample.key)
                 caches = self._fabric.caches[self._cell]
                 caches.setdefault(slot, deque(maxlen=CACHE)).append(sample)

@@ -110,6 +110,15 @@ class ZenohBus:
                 congestion_control=zenoh.CongestionControl.DROP,
                 reliability=zenoh.Reliability.BEST_EFFORT,
             )
+        elif topic.qos is Qos.COMMAND:
+            declared = self._session.declare_publisher(
+                topic.key,
+                encoding=ENCODING,
+                congestion_control=zenoh.CongestionControl.DROP,
+                reliability=zenoh.Reliability.RELIABLE,
+                priority=zenoh.Priority.REAL_TIME,
+                express=True,
+            )
         else:
             declared = zenoh.ext.declare_advanced_publisher(
                 self._session,
@@ -144,7 +153,7 @@ class ZenohBus:
             topic.wildcard,
             deliver,
             history=history if topic.qos is Qos.EVENT else None,
-            recover=topic.qos is not Qos.TELEMETRY,
+            recover=topic.qos in (Qos.STATE, Qos.EVENT),
         )
 
     def subscribe_raw(self, key_expr: str, callback: Callable[[RawSample], None]) -> None:

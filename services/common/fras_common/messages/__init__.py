@@ -6,6 +6,16 @@ in the names (`_m`, `_n`, `_pa`, `_s`, `_rad`). A published message starts with 
 """
 
 from fras_common.messages.base import Array, Header, Pose, Quaternion, Vec3
+from fras_common.messages.crtk import (
+    JawState,
+    JointState,
+    OperatingState,
+    ServoJaw,
+    ServoJoints,
+    StateCommand,
+    TipCommand,
+    TipState,
+)
 from fras_common.messages.motion import (
     ActionResult,
     CancelReply,
@@ -68,9 +78,12 @@ __all__ = [
     "HistoryStep",
     "HoldRequest",
     "HoldState",
+    "JawState",
+    "JointState",
     "LogRecord",
     "NoPlan",
     "OpenRequest",
+    "OperatingState",
     "Plan",
     "PlannedAction",
     "Pose",
@@ -81,13 +94,18 @@ __all__ = [
     "ResumeRequest",
     "RobotState",
     "RpcRecord",
+    "ServoJaw",
+    "ServoJoints",
     "SimCheckpoint",
     "SolverReport",
+    "StateCommand",
     "TargetReply",
     "TargetRequest",
     "TaskReply",
     "TaskRequest",
     "TaskStatus",
+    "TipCommand",
+    "TipState",
     "TissueModel",
     "TissueState",
     "Vec3",

@@ -145,7 +145,15 @@ class PlannerSection(Section, frozen=True, kw_only=True):
 
 
 class MotionSection(Section, frozen=True, kw_only=True):
-    """Speeds and limits of the arms."""
+    """Speeds and limits of the arms.
+
+    Attributes
+    ----------
+    joint_time_constant_s, joint_delay_s : float
+        Lag and dead time of simulated arms.
+    joint_noise_rad, insertion_noise_m : float
+        Standard deviation of what simulated arms measure; drawn from the scenario's seed.
+    """
 
     free_speed_m_s: Annotated[float, Meta(gt=0, le=0.5)] = 0.05
     holding_speed_m_s: Annotated[float, Meta(gt=0, le=0.2)] = 0.02
@@ -157,6 +165,9 @@ class MotionSection(Section, frozen=True, kw_only=True):
     clearance_height_m: Annotated[float, Meta(gt=0, le=0.06)] = 0.03
     retreat_max_m: Annotated[float, Meta(gt=0, le=0.02)] = 0.005
     joint_time_constant_s: Annotated[float, Meta(ge=0, le=1)] = 0.01
+    joint_delay_s: Annotated[float, Meta(ge=0, le=1)] = 0.0
+    joint_noise_rad: Annotated[float, Meta(ge=0, le=0.1)] = 0.0
+    insertion_noise_m: Annotated[float, Meta(ge=0, le=0.01)] = 0.0
 
 
 class RunSection(Section, frozen=True, kw_only=True):

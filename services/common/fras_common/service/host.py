@@ -121,7 +121,7 @@ class ServiceHost:
 
     def subscribe(self, topic: Topic[M], handler: Callable[[M], None]) -> None:
         """Handle each message of `topic` on the loop; in-trial topics pass the trial gate."""
-        if topic.producer not in {"*", self.name}:
+        if topic.producer not in {"*", "client", self.name}:
             self._inputs.add(topic.producer)
 
         def arrive(message: M) -> None:
@@ -255,6 +255,31 @@ class ServiceHost:
             self._mirrors[query.mirror] = self.publisher(RPC.of(service=server, name=name))
         self._mirrors[query.mirror].put(record)
 
+    def report_fault(self, key: str, error: FrasError, *, trial: str = "", tick: int = -1) -> None:
+        """Publish what was refused, with the numbers behind it.
+
+        Parameters
+        ----------
+        key : str
+            Where what was refused came in.
+        error : FrasError
+            Why.
+        trial, tick
+            Of what was refused.
+        """
+        if self._faults is None:
+            self._faults = self.publisher(FAULT.of(service=self.name))
+        self._faults.put(
+            FaultRecord(
+                trial=trial,
+                tick=tick,
+                key=key,
+                kind=error.kind,
+                text=str(error),
+                values={name: str(value) for name, value in error.values.items()},
+            )
+        )
+
     def count_malformed(self, error: MalformedMessage) -> None:
         """Count and log a payload that did not fit its key; the bus calls it."""
         self.counts["malformed"] += 1
@@ -295,21 +320,7 @@ class ServiceHost:
             # Refused for what it says; anything else is our own mistake and ends the process.
             self.counts["refused"] += 1
             self.log.error("message refused", key=topic.key, problem=str(error))
-            self._publish_fault(topic, message, error)
-
-    def _publish_fault(self, topic: Topic[Any], message: Header, error: FrasError) -> None:
-        if self._faults is None:
-            self._faults = self.publisher(FAULT.of(service=self.name))
-        self._faults.put(
-            FaultRecord(
-                trial=message.trial,
-                tick=message.tick,
-                key=topic.key,
-                kind=error.kind,
-                text=str(error),
-                values={name: str(value) for name, value in error.values.items()},
-            )
-        )
+            self.report_fault(topic.key, error, trial=message.trial, tick=message.tick)
 
     def _on_token(self, token: str, present: bool) -> None:
         name, _, instance = token.rpartition("/")

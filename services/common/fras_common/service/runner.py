@@ -6,7 +6,7 @@ import importlib
 import sys
 import threading
 import uuid
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Protocol
@@ -46,8 +46,9 @@ def parse_arguments(
     argv: list[str] | None,
     description: str,
     folders: Mapping[str, str] | None = None,
+    choices: Mapping[str, Sequence[str]] | None = None,
 ) -> argparse.Namespace:
-    """Arguments that every service takes, and the folders that this one does."""
+    """Arguments that every service takes, and the folders and choices that this one does."""
     parser = argparse.ArgumentParser(prog=f"fras {name}", description=description)
     parser.add_argument("--cell", default="local", help="cell (Zenoh namespace fras/<cell>)")
     parser.add_argument(
@@ -60,6 +61,10 @@ def parse_arguments(
     for folder, help_text in (folders or {}).items():
         flag = "--" + folder.replace("_", "-")
         parser.add_argument(flag, dest=folder, type=Path, metavar="DIR", help=help_text)
+    for choice, allowed in (choices or {}).items():
+        parser.add_argument(
+            f"--{choice}", choices=allowed, default=allowed[0], help="(default: %(default)s)"
+        )
     return parser.parse_args(argv)
 
 
@@ -69,6 +74,8 @@ def run_service(
     argv: list[str] | None = None,
     description: str = "",
     folders: Mapping[str, str] | None = None,
+    choices: Mapping[str, Sequence[str]] | None = None,
+    extra: str = "",
 ) -> int:
     """Run a service until it is told to stop.
 
@@ -85,6 +92,11 @@ def run_service(
         First line of `--help`.
     folders : mapping of str to str, optional
         Names of folders that the shell takes, as keywords, with their help.
+    choices : mapping of str to sequence of str, optional
+        Names of options that the shell takes, as keywords, with what they may be; the first is the
+        default.
+    extra : str
+        Which of the distribution's extras holds its libraries; by default that of its own name.
 
     Returns
     -------
@@ -92,16 +104,16 @@ def run_service(
         Exit status: 0 after a stop, 3 if a library is missing, the router can't be reached or the
         shell can't be made of what it was given.
     """
-    folders = folders or {}
-    options = parse_arguments(name, argv, description, folders)
-    given = {folder: getattr(options, folder) for folder in folders}
+    folders, choices = folders or {}, choices or {}
+    options = parse_arguments(name, argv, description, folders, choices)
+    given = {option: getattr(options, option) for option in (*folders, *choices)}
     stop = StopFlag()
     stop.install()
     host = ServiceHost(name)
     host.log = configure_logging(name, options.log_level, host.publish_log)
     instance = options.instance or uuid.uuid4().hex[:4]
     try:
-        with require_extra(name):
+        with require_extra(extra or name):
             build = _load(shell)
     except MissingExtra as error:
         print(f"fras {name}: {error}", file=sys.stderr)

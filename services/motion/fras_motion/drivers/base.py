@@ -5,9 +5,25 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
+from fras_common.errors import FrasError
 from fras_motion.kinematics import Joints
 
-__all__ = ["Driver", "Measured", "Setpoint"]
+__all__ = ["Driver", "DriverFault", "Measured", "Setpoint"]
+
+
+class DriverFault(FrasError):
+    """A robot that does not do its part.
+
+    Parameters
+    ----------
+    arm : str
+        Which.
+    whose : str
+        The service that drives it, as `hold:<service>` names it.
+    """
+
+    arm: str
+    whose: str
 
 
 @dataclass(frozen=True)
@@ -60,16 +76,29 @@ class Driver(Protocol):
         -------
         Measured
             The arm at tick 0.
+
+        Raises
+        ------
+        DriverFault
+            It is not there, or not to be had.
         """
         ...
 
-    def servo(self, setpoint: Setpoint, dt_s: float) -> Measured:
-        """Follow a setpoint for one tick.
+    def send(self, setpoint: Setpoint) -> None:
+        """Have the arm follow a setpoint from now on; never waits.
 
         Parameters
         ----------
         setpoint : Setpoint
-            What holds from now to the end of the tick.
+            What holds until the next one.
+        """
+        ...
+
+    def measure(self, dt_s: float) -> Measured:
+        """Let a tick pass.
+
+        Parameters
+        ----------
         dt_s : float
             Duration of the tick [s].
 
@@ -77,5 +106,10 @@ class Driver(Protocol):
         -------
         Measured
             The arm at the end of the tick.
+
+        Raises
+        ------
+        DriverFault
+            It does not answer, or does not follow.
         """
         ...

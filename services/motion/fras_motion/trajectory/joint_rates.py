@@ -16,6 +16,8 @@ __all__ = ["within_joint_rates"]
 _SAMPLES = 33
 # Between the samples the derivatives may be a little larger than at them.
 _RESERVE = 0.95
+# A joint that stands still on the way limits nothing.
+_FLAT = 1e-9
 _SPEEDS = np.array([joint.speed for joint in JOINTS])
 _ACCELERATIONS = np.array([joint.acceleration for joint in JOINTS])
 
@@ -63,14 +65,13 @@ def within_joint_rates(
             for s in arc
         ]
     )
-    slope = np.abs(slopes).max(axis=0)
-    curvature = np.abs(np.diff(slopes, axis=0)).max(axis=0) / float(arc[1])
-    tiny = np.finfo(np.float64).tiny
+    slope = np.maximum(np.abs(slopes).max(axis=0), _FLAT)
+    curvature = np.maximum(np.abs(np.diff(slopes, axis=0)).max(axis=0) / float(arc[1]), _FLAT)
     speed = min(
         limits.speed,
-        _RESERVE * float((_SPEEDS / (slope + tiny)).min()),
-        sqrt(0.5 * _RESERVE * float((_ACCELERATIONS / (curvature + tiny)).min())),
+        _RESERVE * float((_SPEEDS / slope).min()),
+        sqrt(0.5 * _RESERVE * float((_ACCELERATIONS / curvature).min())),
     )
     left = _RESERVE * _ACCELERATIONS - curvature * speed**2
-    acceleration = min(limits.acceleration, float((left / (slope + tiny)).min()))
+    acceleration = min(limits.acceleration, float((left / slope).min()))
     return Limits(speed, acceleration, limits.jerk)

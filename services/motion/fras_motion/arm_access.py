@@ -1,0 +1,196 @@
+"""Who drives the arms: this process, for CRTK clients too while no trial runs, or another one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Protocol
+
+from fras_common import messages as m
+from fras_common.errors import FrasError
+from fras_common.service import ServiceHost
+from fras_common.topics import CRTK
+from fras_motion.crtk import ArmStatus, CommandRefused, DirectControl, shown
+from fras_motion.crtk.face import CrtkFace
+from fras_motion.crtk.link import CrtkLink
+from fras_motion.drivers import CrtkDriver, Driver
+from fras_motion.holds import Holds
+from fras_motion.kinematics import BASES_IN_WORLD, HOME_TIPS_M, ArmKinematics
+from fras_motion.pacing import Pacer
+from fras_motion.parameters import MotionParameters
+from fras_motion.robots import home_setpoints, simulated_drivers
+from fras_motion.trial import MotionTrial
+
+__all__ = ["ArmAccess", "PaceTooFast", "remote_arms", "simulated_arms"]
+
+# State commands that stop an arm; what leads back to ENABLED lifts their hold.
+_STOPS = ("pause", "disable")
+_IDLE_S = 60.0
+
+
+class PaceTooFast(FrasError):
+    """Arms of another process move in real time.
+
+    Parameters
+    ----------
+    pace : float
+        What was asked for; 0 is as fast as possible.
+    """
+
+    pace: float
+
+    def __init__(self, pace: float) -> None:
+        super().__init__(
+            f"pace {pace:g}: the arms are those of another process and move in real time; "
+            "run at a pace above 0, 1 at most",
+            pace=pace,
+        )
+
+
+class ArmAccess(Protocol):
+    """What the service asks of whoever has the arms."""
+
+    def drivers(self, parameters: MotionParameters, pace: float) -> Mapping[str, Driver]:
+        """Make the drivers of a trial.
+
+        Raises
+        ------
+        PaceTooFast
+        """
+        ...
+
+    def operating_state(self, arm: str) -> str:
+        """State of an arm by CRTK; an enabled one that somebody holds is paused."""
+        ...
+
+    def wake(self, trial: MotionTrial | None, now_s: float) -> float:
+        """Do what is due; return the seconds until it wants to be called again."""
+        ...
+
+
+class SimulatedArms:
+    """Arms of this process: a trial's while it runs, a CRTK client's otherwise."""
+
+    def __init__(self, host: ServiceHost, holds: Holds) -> None:
+        self._host = host
+        self._holds = holds
+        self._trial: MotionTrial | None = None
+        parameters = MotionParameters()
+        kinematics = {name: ArmKinematics(base) for name, base in BASES_IN_WORLD.items()}
+        home = home_setpoints(kinematics, HOME_TIPS_M, parameters)
+        self._direct = DirectControl(
+            parameters, kinematics, simulated_drivers(parameters, kinematics), home
+        )
+        self._pacer = Pacer(parameters.dt_s, 1.0)
+        self._face = CrtkFace(host, self._direct, kinematics, self._permit, self._on_state)
+
+    def drivers(self, parameters: MotionParameters, pace: float) -> Mapping[str, Driver]:
+        """Make simulated arms with the numbers of the trial."""
+        del pace
+        return simulated_drivers(parameters, BASES_IN_WORLD)
+
+    def operating_state(self, arm: str) -> str:
+        """State of an arm by CRTK."""
+        return shown(self._direct.status(arm), held=bool(self._holds.current()))
+
+    def wake(self, trial: MotionTrial | None, now_s: float) -> float:
+        """Say where the arms are; while no trial runs, follow who leads them."""
+        if self._trial is not None and not self._trial.runs:
+            controller = self._trial.controller
+            self._direct.take_over(controller.snapshot.arms, controller.drivers)
+        self._trial = trial if trial is not None and trial.runs else None
+        held = bool(self._holds.current())
+        if self._trial is not None:
+            snapshot, goal = self._trial.controller.snapshot, self._trial.goal
+            busy = {goal.arm: True} if goal is not None else {}
+            arms = {
+                name: replace(arm, operating_state=self.operating_state(name))
+                for name, arm in snapshot.arms.items()
+            }
+            self._face.publish(arms, busy, snapshot.tick, now_s)
+            return self._face.heartbeat_in_s(now_s)
+        wait_s = self._face.heartbeat_in_s(now_s)
+        if self._direct.moving:
+            wait_s = min(wait_s, self._tick(held=held, now_s=now_s))
+        arms = self._direct.snapshot(held=held)
+        self._face.publish(arms, {arm: self._direct.busy(arm) for arm in arms}, -1, now_s)
+        return wait_s
+
+    def _tick(self, *, held: bool, now_s: float) -> float:
+        if (wait_s := self._pacer.wait_s(now_s)) > 0.0:
+            return wait_s
+        self._pacer.ticked(now_s)
+        for refusal in self._direct.tick(held=held):
+            self._holds.hold(f"crtk/{refusal.arm}", "fault")
+            self._host.report_fault(f"{refusal.arm}/{refusal.command}", refusal)
+        return self._pacer.wait_s(now_s)
+
+    def _permit(self, arm: str, command: str) -> None:
+        if self._trial is not None:
+            text = f"trial {self._trial.name!r} leads the arms; wait for its end or abort it"
+            raise CommandRefused(arm, command, "trial_runs", text, trial=self._trial.name)
+        if holds := self._holds.in_words():
+            text = f"the arms are held ({holds}); `fras resume` lifts a hold"
+            raise CommandRefused(arm, command, "held", text)
+
+    def _on_state(self, arm: str, command: str) -> None:
+        if command in ("home", "unhome") and self._trial is not None:
+            text = f"trial {self._trial.name!r} leads the arms"
+            raise CommandRefused(arm, "state_command", "trial_runs", text, trial=self._trial.name)
+        status = self._direct.state_command(arm, command)
+        holder = f"crtk/{arm}"
+        if command in _STOPS:
+            self._holds.hold(holder, command)
+        elif status.state == "ENABLED" and holder in self._holds.current():
+            self._holds.resume(holder, by=holder)
+        self._host.log.info("state", arm=arm, state=status.state, homed=status.is_homed)
+
+
+class RemoteArms:
+    """Arms of another process, under the keys of CRTK; it decides who else may lead them."""
+
+    def __init__(self, host: ServiceHost, holds: Holds) -> None:
+        self._holds = holds
+        self._link = CrtkLink(host)
+        self._states: dict[str, str] = {}
+        for keys in CRTK:
+            host.subscribe(keys.operating_state, self._watch(keys.arm))
+
+    def drivers(self, parameters: MotionParameters, pace: float) -> Mapping[str, Driver]:
+        """Make drivers that reach the arms over the bus."""
+        del parameters
+        if not 0.0 < pace <= 1.0:
+            raise PaceTooFast(pace)
+        return {name: CrtkDriver(name, self._link) for name in BASES_IN_WORLD}
+
+    def operating_state(self, arm: str) -> str:
+        """State of an arm as its process says; DISABLED before it said any."""
+        status = ArmStatus(self._states.get(arm, "DISABLED"))
+        return shown(status, held=bool(self._holds.current()))
+
+    def wake(self, trial: MotionTrial | None, now_s: float) -> float:
+        """Nothing is due: the other process says where its arms are."""
+        del trial, now_s
+        return _IDLE_S
+
+    def _watch(self, arm: str) -> Callable[[m.OperatingState], None]:
+        holder = f"arms/{arm}"
+
+        def on_state(state: m.OperatingState) -> None:
+            self._states[arm] = state.state
+            if state.state != "ENABLED" or not state.is_homed:
+                self._holds.hold(holder, state.state.lower() if state.is_homed else "not homed")
+            elif holder in self._holds.current():
+                self._holds.resume(holder, by=holder)
+
+        return on_state
+
+
+def simulated_arms(host: ServiceHost, holds: Holds) -> ArmAccess:
+    """Arms of this process."""
+    return SimulatedArms(host, holds)
+
+
+def remote_arms(host: ServiceHost, holds: Holds) -> ArmAccess:
+    """Arms of another process."""
+    return RemoteArms(host, holds)
