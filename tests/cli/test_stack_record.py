@@ -8,6 +8,7 @@ import psutil
 import pytest
 
 from fras_cli import runtime
+from fras_cli.keep import endpoint
 
 
 @pytest.fixture(autouse=True)
@@ -65,3 +66,34 @@ def test_damaged_record_is_no_stack(tmp_path: Path) -> None:
     path.write_text("{")
     assert runtime.find("local") is None
     assert not path.exists()
+
+
+def test_stacks_that_runs_start_for_themselves_are_found_beside_the_kept_one(
+    tmp_path: Path,
+) -> None:
+    with runtime.noted("local", "tcp/127.0.0.1:2", tmp_path):
+        assert runtime.find("local") is None
+        assert [one.connect for one in runtime.all_of("local")] == ["tcp/127.0.0.1:2"]
+        assert endpoint("local", None) == "tcp/127.0.0.1:2"
+        kept = runtime.keep("local", "tcp/127.0.0.1:1", tmp_path)
+        assert [one.connect for one in runtime.all_of("local")] == [
+            "tcp/127.0.0.1:1",
+            "tcp/127.0.0.1:2",
+        ]
+        assert runtime.all_of("loc") == []
+        with pytest.raises(runtime.SeveralStacks, match=r"--connect.*:1, .*:2"):
+            endpoint("local", None)
+        assert endpoint("local", "tcp/127.0.0.1:9") == "tcp/127.0.0.1:9"
+        runtime.forget(kept)
+    assert runtime.all_of("local") == []
+    with pytest.raises(runtime.NoStack):
+        runtime.require_any("local")
+
+
+def test_the_note_of_a_run_that_was_killed_is_removed(tmp_path: Path) -> None:
+    with runtime.noted("local", "tcp/127.0.0.1:2", tmp_path):
+        (path,) = runtime.runtime_dir().glob("local.*.json")
+        text = path.read_text()
+        path.write_text(text.replace(str(psutil.Process().create_time()), "1.5"))
+        assert runtime.all_of("local") == []
+        assert not path.exists()

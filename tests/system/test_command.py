@@ -310,3 +310,18 @@ def test_a_trial_by_rules_of_ones_own(fras: Fras, tmp_path: Path) -> None:
     faulty = fras("run", "a", "--out", "faulty", "--asp-dir", "rules")
     assert faulty.end() == 3
     assert "rules/goal.lp:2: error: syntax error" in faulty.text
+
+
+def test_stop_reaches_the_stack_that_a_run_started_for_itself(fras: Fras, tmp_path: Path) -> None:
+    run = fras("run", "a", "--pace", "1", "--out", "out", "--json")
+    run.until("lifting")
+    stop = fras("stop", "--reason", "look first")
+    assert stop.end() == 0
+    assert "stop acknowledged" in stop.text
+    assert "held by cli: look first" in stop.text
+    run.until("stopped by cli: look first")
+    resume = fras("resume")
+    assert resume.end() == 0
+    assert run.end() == 0
+    assert summary_of(tmp_path / "out")["outcome"] == "success"
+    assert fras("stop").end() == 3

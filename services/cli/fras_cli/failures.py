@@ -8,7 +8,7 @@ from fras_cli.run import (
     EXIT_STACK,
     FolderInUse,
 )
-from fras_cli.runtime import BadCell, NoStack, StackExists
+from fras_cli.runtime import BadCell, NoStack, SeveralStacks, StackExists
 from fras_cli.stack import OtherRules, StackIncomplete
 from fras_cli.trial import StackDied, TrialRefused
 from fras_common.bus import NoAnswer
@@ -36,6 +36,7 @@ STACK_ERRORS = (
     NoAnswer,
     NoRouter,
     NoStack,
+    SeveralStacks,
     NotReady,
     PortTaken,
     ServiceDied,

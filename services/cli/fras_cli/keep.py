@@ -101,8 +101,25 @@ def down(cell: str, console: Console) -> int:
 
 
 def endpoint(cell: str, connect: str | None) -> str:
-    """Endpoint given, or that of the stack in `cell`."""
-    return connect or runtime.require(cell).connect
+    """Endpoint given, or that of the stack in `cell`.
+
+    Raises
+    ------
+    NoStack
+        There is none.
+    SeveralStacks
+        There are several.
+    """
+    if connect is not None:
+        return connect
+    records = runtime.require_any(cell)
+    if len(records) > 1:
+        places = ", ".join(record.connect for record in records)
+        raise runtime.SeveralStacks(
+            f"{len(records)} stacks run in cell {cell!r}: say which with --connect: {places}",
+            places=places,
+        )
+    return records[0].connect
 
 
 def status(cell: str, connect: str | None, console: Console) -> int:
@@ -148,15 +165,29 @@ def status(cell: str, connect: str | None, console: Console) -> int:
 
 
 def hold(cell: str, connect: str | None, reason: str, console: Console) -> int:
-    """Stop the arms: at rest within two ticks, until somebody resumes."""
-    with Link(cell, endpoint(cell, connect), open_timeout_s=QUERY_TIMEOUT_S) as link:
+    """Stop the arms of every stack in the cell: at rest within two ticks, until somebody resumes.
+
+    A stack that does not answer is told, and keeps none of the others from being stopped.
+    """
+    places = [connect] if connect else [one.connect for one in runtime.require_any(cell)]
+    failures: list[FrasError] = []
+    for place in places:
+        try:
+            _hold(cell, place, reason, console)
+        except FrasError as error:
+            failures.append(error)
+            console.print(escape(f"{place}: {error}"), style="bold red")
+    return EXIT_STACK if failures else EXIT_OK
+
+
+def _hold(cell: str, place: str, reason: str, console: Console) -> None:
+    with Link(cell, place, open_timeout_s=QUERY_TIMEOUT_S) as link:
         began_s = time.monotonic()
         request = HoldRequest(holder=HOLDER, reason=reason)
         state = link.bus.query(HOLD, request, QUERY_TIMEOUT_S)
         took_ms = (time.monotonic() - began_s) * 1e3
-    console.print(f"stop acknowledged at tick {state.tick} after {took_ms:.1f} ms")
+    console.print(f"{place}: stop acknowledged at tick {state.tick} after {took_ms:.1f} ms")
     _print_holds(state, console)
-    return EXIT_OK
 
 
 def why_not(question: str, cell: str, connect: str | None, console: Console) -> int:

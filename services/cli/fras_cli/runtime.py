@@ -1,8 +1,13 @@
-"""The stacks that `fras up` keeps running on this machine: one small file a cell."""
+"""The stacks that run on this machine, one small file each: so that `fras stop` finds them.
+
+`<cell>.json` is that of `fras up`, `<cell>.<pid>.json` one that `fras run` started for itself.
+"""
 
 import os
 import re
 import tempfile
+from collections.abc import Generator
+from contextlib import contextmanager
 from pathlib import Path
 
 import msgspec
@@ -16,6 +21,10 @@ CLOCK_STEP_S = 3600.0
 
 class NoStack(FrasError):
     """No stack runs in the cell."""
+
+
+class SeveralStacks(FrasError):
+    """More than one stack runs in the cell, and it is not clear which one is meant."""
 
 
 class StackExists(FrasError):
@@ -32,7 +41,7 @@ class StackRecord(msgspec.Struct, frozen=True, kw_only=True):
     Attributes
     ----------
     pid, created_s : int, float
-        Process of `fras up`; a reused process id has another creation time.
+        Process that keeps it; a reused process id has another creation time.
     """
 
     cell: str
@@ -77,7 +86,16 @@ def is_alive(record: StackRecord) -> bool:
 
 def find(cell: str) -> StackRecord | None:
     """Find the record of a running stack; one whose process is gone is removed."""
-    path = record_path(cell)
+    return _read(record_path(cell))
+
+
+def all_of(cell: str) -> list[StackRecord]:
+    """Find the records of all running stacks of a cell, that of `fras up` first."""
+    paths = [record_path(cell), *sorted(runtime_dir().glob(f"{cell}.*.json"))]
+    return [record for path in paths if (record := _read(path)) is not None]
+
+
+def _read(path: Path) -> StackRecord | None:
     try:
         record = msgspec.json.decode(path.read_bytes(), type=StackRecord)
     except FileNotFoundError:
@@ -101,8 +119,26 @@ def require(cell: str) -> StackRecord:
     """
     record = find(cell)
     if record is None:
-        raise NoStack(f"no stack runs in cell {cell!r}: start one with `fras up --cell {cell}`")
+        raise _none(cell)
     return record
+
+
+def require_any(cell: str) -> list[StackRecord]:
+    """Find the records of all running stacks of a cell.
+
+    Raises
+    ------
+    NoStack
+        There is none.
+    """
+    records = all_of(cell)
+    if not records:
+        raise _none(cell)
+    return records
+
+
+def _none(cell: str) -> NoStack:
+    return NoStack(f"no stack runs in cell {cell!r}: start one with `fras up --cell {cell}`")
 
 
 def keep(cell: str, connect: str, log_dir: Path) -> StackRecord:
@@ -120,16 +156,9 @@ def keep(cell: str, connect: str, log_dir: Path) -> StackRecord:
             f"stop it with `fras down --cell {cell}` or choose another --cell",
             pid=other.pid,
         )
-    me = psutil.Process()
-    record = StackRecord(
-        cell=cell,
-        pid=me.pid,
-        created_s=me.create_time(),
-        connect=connect,
-        log_dir=str(log_dir),
-    )
+    record = _of_this_process(cell, connect, log_dir)
     path = record_path(cell)
-    temporary = path.with_suffix(f".{me.pid}")
+    temporary = path.with_suffix(f".{record.pid}")
     temporary.write_bytes(msgspec.json.encode(record))
     try:
         # Unlike a rename this fails if somebody was quicker.
@@ -139,6 +168,29 @@ def keep(cell: str, connect: str, log_dir: Path) -> StackRecord:
     finally:
         temporary.unlink()
     return record
+
+
+def _of_this_process(cell: str, connect: str, log_dir: Path) -> StackRecord:
+    me = psutil.Process()
+    return StackRecord(
+        cell=cell,
+        pid=me.pid,
+        created_s=me.create_time(),
+        connect=connect,
+        log_dir=str(log_dir),
+    )
+
+
+@contextmanager
+def noted(cell: str, connect: str, log_dir: Path) -> Generator[None]:
+    """Record, within the block, that this process runs a stack for itself."""
+    record = _of_this_process(cell, connect, log_dir)
+    path = record_path(cell).with_suffix(f".{record.pid}.json")
+    path.write_bytes(msgspec.json.encode(record))
+    try:
+        yield
+    finally:
+        path.unlink(missing_ok=True)
 
 
 def forget(record: StackRecord) -> None:

@@ -260,6 +260,9 @@ def use_stack(
             yield used
     else:
         tell("starting the services")
-        endpoint = f"tcp/127.0.0.1:{port}" if port is not None else None
-        with own_stack(cell, endpoint, log_dir, cancelled, tell=tell, layout=layout) as used:
+        endpoint = f"tcp/127.0.0.1:{port or free_port()}"
+        with (
+            runtime.noted(cell, endpoint, log_dir),
+            own_stack(cell, endpoint, log_dir, cancelled, tell=tell, layout=layout) as used,
+        ):
             yield used
