@@ -2,6 +2,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from benchmarks import psm_reference as reference
 
 from fras_motion.kinematics import (
     BASES_IN_WORLD,
@@ -48,3 +49,16 @@ def test_whole_workspace_box_is_reachable_with_margin(name):
 def test_arms_stand_at_their_own_sides_with_their_tips_above_the_tissue():
     assert BASES_IN_WORLD["psm1"].position_m[1] < 0.06 < BASES_IN_WORLD["psm2"].position_m[1]
     assert HOME_TIPS_M == {"psm1": (0.05, 0.03, 0.06), "psm2": (0.05, 0.09, 0.06)}
+
+
+@pytest.mark.parametrize("name", sorted(BASES_IN_WORLD))
+def test_arms_stand_where_the_reference_says(name):
+    base = BASES_IN_WORLD[name]
+    position, turn = reference.BASES[name]
+    assert base.position_m == position
+    c, s = np.cos(turn), np.sin(turn)
+    np.testing.assert_allclose(
+        matrix(base.quaternion_xyzw), [[c, -s, 0], [s, c, 0], [0, 0, 1]], atol=1e-15
+    )
+    down = matrix(ArmKinematics(base).tool_down_xyzw)
+    np.testing.assert_allclose(down, reference.tool_down(name), atol=1e-15)

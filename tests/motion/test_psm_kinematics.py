@@ -1,10 +1,13 @@
 import numpy as np
 import pytest
+from benchmarks import psm_reference as reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fras_motion.kinematics import (
     BASES_IN_WORLD,
+    JAW_LOWER_RAD,
+    JAW_UPPER_RAD,
     JOINTS,
     ArmKinematics,
     Joints,
@@ -36,6 +39,27 @@ def test_forward_gives_the_reference_vectors(joints, position, rotation):
     tip = AT_ORIGIN.forward(joints)
     assert tip.position_m == pytest.approx(position, abs=5e-5)
     np.testing.assert_allclose(matrix(tip.quaternion_xyzw), rotation, atol=5e-4)
+    # What the benchmark and the log's tests hold motion against gives them, too.
+    positions, rotations = reference.forward(np.array([joints], dtype=np.float64))
+    np.testing.assert_allclose(positions[0], position, atol=5e-5)
+    np.testing.assert_allclose(rotations[0], rotation, atol=5e-4)
+
+
+@given(within_limits, st.sampled_from(sorted(PLACED)))
+@settings(max_examples=200, deadline=None)
+def test_forward_agrees_with_the_table_multiplied_out(joints, name):
+    tip = PLACED[name].forward(joints)
+    positions, rotations = reference.forward(np.array([joints]), reference.BASES[name])
+    np.testing.assert_allclose(tip.position_m, positions[0], atol=1e-14)
+    np.testing.assert_allclose(matrix(tip.quaternion_xyzw), rotations[0], atol=1e-13)
+
+
+def test_limits_are_those_of_the_table():
+    rows = [(j.lower, j.upper, j.speed, j.acceleration) for j in JOINTS]
+    table = (reference.LOWER, reference.UPPER, reference.SPEED, reference.ACCELERATION)
+    np.testing.assert_array_equal(rows, np.transpose(table))
+    assert tuple(joint.name for joint in JOINTS) == reference.NAMES
+    np.testing.assert_allclose((JAW_LOWER_RAD, JAW_UPPER_RAD), reference.JAW_RAD, rtol=1e-15)
 
 
 def test_base_placement_moves_the_tip_rigidly():
@@ -52,10 +76,10 @@ def test_base_placement_moves_the_tip_rigidly():
     )
 
 
-@given(within_limits)
-@settings(max_examples=50, deadline=None)
-def test_jacobian_agrees_with_finite_differences(joints):
-    arm, step = PLACED["psm1"], 1e-6
+@given(within_limits, st.sampled_from(sorted(PLACED)))
+@settings(max_examples=100, deadline=None)
+def test_jacobian_agrees_with_finite_differences(joints, name):
+    arm, step = PLACED[name], 1e-6
     jacobian = arm.jacobian(joints)
     rotation = matrix(arm.forward(joints).quaternion_xyzw)
     for column in range(6):
@@ -151,15 +175,18 @@ def test_roll_stays_next_to_where_it_was():
     assert AT_ORIGIN.inverse(far, near=(0, 0, 0.1, 4.5, 0, 0))[3] == pytest.approx(-1.5)
 
 
-@given(within_limits)
-@settings(max_examples=50, deadline=None)
-def test_shaft_always_passes_the_remote_centre(joints):
-    arm = PLACED["psm2"]
+@given(within_limits, st.sampled_from(sorted(PLACED)))
+@settings(max_examples=100, deadline=None)
+def test_shaft_always_passes_the_remote_centre(joints, name):
+    arm = PLACED[name]
     origins = arm.joint_origins(joints)
     centre = np.array(arm.base_in_world.position_m)
+    np.testing.assert_array_equal(origins[:2], [centre, centre])  # yaw and pitch turn about it
     shaft = origins[3] - origins[2]
     away = np.cross(shaft / np.linalg.norm(shaft), centre - origins[3])
     assert np.linalg.norm(away) < 1e-12
+    # The wrist is past it by what is inserted, less what the table leaves outside.
+    assert np.linalg.norm(origins[3] - centre) == pytest.approx(joints[2] - 0.0156, abs=1e-12)
 
 
 @given(st.tuples(*(st.floats(-1, 1),) * 4).filter(lambda q: sum(x * x for x in q) > 0.01))
