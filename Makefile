@@ -56,6 +56,7 @@ bench: $(VENV)/.installed-dev ## measure; figures belong into docs/benchmarks.md
 	$(BIN)/fras bench mesh
 	$(BIN)/fras bench planner
 	$(BIN)/fras bench criteria
+	$(BIN)/fras bench motion
 
 clean: ## remove what was built; runs/ stays
 	rm -rf $(VENV) build dist .pytest_cache .ruff_cache .import_linter_cache .hypothesis

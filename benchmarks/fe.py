@@ -14,7 +14,6 @@ import importlib.util
 import json
 import multiprocessing
 import os
-import platform
 import time
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -22,6 +21,7 @@ from typing import Any
 
 import numpy as np
 from benchmarks.fe_figure import draw
+from benchmarks.machine import processor
 from benchmarks.memory import memory_mib
 
 DEFAULT_MESHES = ("11x13x2", "21x25x2", "21x25x3", "41x49x3")
@@ -179,7 +179,7 @@ def main() -> None:
     result = {
         "machine": {
             "memory_gb_s": round(memory_gb_s, 1),
-            "processor": _processor(),
+            "processor": processor(),
             "cores": os.cpu_count(),
             "threads_allowed": THREADS,
         },
@@ -203,15 +203,6 @@ def _memory_gb_s() -> float:
         numbers.sum()
         spent_s.append(time.perf_counter() - began_s)
     return numbers.nbytes / min(spent_s) / 1e9
-
-
-def _processor() -> str:
-    try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-    except OSError:
-        return platform.processor()
-    names = [line.split(":")[1].strip() for line in lines if line.startswith("model name")]
-    return names[0] if names else platform.processor()
 
 
 if __name__ == "__main__":

@@ -16,8 +16,6 @@ finish within the budget is said so, and what is larger is not tried.
 import argparse
 import json
 import os
-import platform
-import re
 from collections.abc import Callable
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
@@ -25,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from benchmarks.machine import processor
 from benchmarks.planner_figure import criteria_table, draw, main_table, targets
 from benchmarks.planner_jobs import (
     Raw,
@@ -166,14 +165,6 @@ def measure(sizes: list[int], budget_s: float, repeats: int) -> dict[int, Raw]:
     return result
 
 
-def _processor() -> str:
-    try:
-        found = re.search(r"model name\s*:\s*(.+)", Path("/proc/cpuinfo").read_text())
-    except OSError:
-        found = None
-    return found[1] if found else platform.processor()
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(prog="fras bench planner", description=__doc__)
     parser.add_argument("--sizes", type=int, nargs="+", default=SIZES, metavar="N")
@@ -217,7 +208,7 @@ def main() -> None:
     options.out.mkdir(parents=True, exist_ok=True)
     exponents = draw(result, VARIANTS, CRITERIA, options.out / "planner.png")
     report = {
-        "machine": {"processor": _processor(), "cores": os.cpu_count()},
+        "machine": {"processor": processor(), "cores": os.cpu_count()},
         "setting": {"repeats": options.repeats, "budget_s": options.budget},
         "compared_by": CRITERIA[0],
         "sizes": result,

@@ -19,7 +19,7 @@ def test_the_list_names_every_benchmark():
 
 @pytest.mark.parametrize("name", bench.BENCHMARKS)
 def test_each_takes_options_of_its_own(name, capfd):
-    if name == "fe" and importlib.util.find_spec("matplotlib") is None:
+    if name in ("fe", "motion") and importlib.util.find_spec("matplotlib") is None:
         pytest.skip("matplotlib is not installed")
     assert bench.run_benchmark(name, ["--help"]) == 0
     assert f"usage: fras bench {name}" in capfd.readouterr().out
@@ -38,7 +38,7 @@ def test_options_reach_it_through_the_command(capfd):
 
 def test_an_unknown_one_is_named_with_the_known_ones():
     with pytest.raises(
-        bench.UnknownBenchmark, match=r"'fee'.*fe, mesh, stress, planner, criteria, loop"
+        bench.UnknownBenchmark, match=r"'fee'.*fe, mesh, stress, planner, criteria, motion, loop"
     ):
         bench.run_benchmark("fee", [])
 

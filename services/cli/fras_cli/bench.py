@@ -17,6 +17,7 @@ BENCHMARKS: dict[str, tuple[str, str]] = {
     "stress": ("fras_sim.stress", "10,000 steps that try to break the tissue."),
     "planner": ("benchmarks.planner", "The planner against the paper's way with clingo, by grid."),
     "criteria": ("benchmarks.criteria", "Where each criterion grasps, over 400 scenes."),
+    "motion": ("benchmarks.motion", "The arms against their limits, their stops and their reach."),
     "loop": ("benchmarks.loop", "A tick of all services against three raw Zenoh hops."),
 }
 

@@ -1,0 +1,14 @@
+"""On what machine a benchmark ran."""
+
+import platform
+import re
+from pathlib import Path
+
+
+def processor() -> str:
+    """Name of the processor; empty where nothing tells it."""
+    try:
+        found = re.search(r"model name\s*:\s*(.+)", Path("/proc/cpuinfo").read_text())
+    except OSError:
+        found = None
+    return found[1] if found else platform.processor()
