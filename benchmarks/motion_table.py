@@ -25,6 +25,11 @@ def tables(report: Raw) -> str:
     lines.append(_durations("a tick of the controller", ticks["advance"]))
     lines.append(_durations("an action accepted", ticks["accept"]))
     lines.append(_durations(f"paced {paced['pace']:g} x: done after due", paced))
+    lines.append(_durations("  of the processor's time", paced["worked"]))
+    lines.append(
+        f"{'  late':34}{paced['late']} of {paced['ticks']:,}, {paced['woken_late']} of them woken "
+        "late by the machine"
+    )
     lines.append(
         f"{anywhere['poses']:,} poses from anywhere: off {anywhere['off_m']:.1e} m, "
         f"{anywhere['turned_rad']:.1e} rad, none refused; damped least squares finds joints "

@@ -1,7 +1,7 @@
 """What motion's parts take: inverse kinematics beside its peer, and ticks against a wall clock."""
 
 from collections.abc import Callable
-from time import perf_counter, sleep
+from time import perf_counter, sleep, thread_time
 from typing import Any
 
 import numpy as np
@@ -152,21 +152,26 @@ def paced_ticks(ticks: int, pace: float, seed: int, tell: Callable[[int], None])
     Each is late by what its setpoint was done after it was due (`perf_counter`); it counts as
     late when the next one was due by then. As with the service's pacer, a late tick puts the
     following ones off, and none catches up. What an action's acceptance takes is not part of it:
-    logical time stands still until then.
+    logical time stands still until then. Of the late ones it tells how many the machine woke too
+    late already, and what the ticks took of the processor (`thread_time`), however busy it is.
     """
     rng = np.random.default_rng(seed)
     controller, goals = MotionController(), random_goals(rng)
     period_s = MotionParameters().dt_s / pace
     lateness: list[float] = []
-    due_s = 0.0
+    worked_s: list[float] = []
+    due_s, woken_late = 0.0, 0
     while len(lateness) < ticks:
         if not controller.wants_tick:
             accept(controller, next(goals), rng)
             due_s = perf_counter()
         sleep(max(0.0, due_s - perf_counter()))
         began_s = perf_counter()
+        work_began_s = thread_time()
         controller.advance(calm(controller))
+        worked_s.append(thread_time() - work_began_s)
         lateness.append(perf_counter() - due_s)
+        woken_late += began_s - due_s > period_s
         due_s = max(due_s, began_s - period_s) + period_s
         tell(len(lateness))
     late = sum(one > period_s for one in lateness)
@@ -175,6 +180,8 @@ def paced_ticks(ticks: int, pace: float, seed: int, tell: Callable[[int], None])
         "pace": pace,
         "period_ms": period_s * 1e3,
         "late": late,
+        "woken_late": woken_late,
         "late_in_10000": round(late * 1e4 / ticks, 2),
+        "worked": spread_us(worked_s),
         **spread_us(lateness),
     }
