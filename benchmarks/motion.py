@@ -34,7 +34,7 @@ OUT = Path("runs/bench")
 TICKS = 10_000
 STOPS = 300
 POSES = 1000
-TELL_EVERY_S = 2.0
+TELL_EVERY_S = 10.0
 Raw = dict[str, Any]
 
 

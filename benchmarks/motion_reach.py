@@ -109,7 +109,7 @@ def draw(maps: dict[str, Floats], figures: Raw, path: Path) -> None:
                 _mark_half(axes, arm)
             _mark_worst(row[2], figures[arm])
             _joint_map(row[3], shares)
-            row[3].set_title(f"{arm}, nearest to its limit")
+            row[3].set_title(f"{arm}, the joint nearest its limit")
             _mark_half(row[3], arm)
             row[0].set_ylabel("y [mm]")
         for axes in panels[-1]:
@@ -118,7 +118,7 @@ def draw(maps: dict[str, Floats], figures: Raw, path: Path) -> None:
             bar = figure.colorbar(image, ax=panels[:, :3], location="bottom", aspect=50, pad=0.02)
             bar.set_label("distance of the nearest joint from its limit [% of the joint's range]")
         _legend(figure, maps)
-        figure.savefig(path, dpi=150)
+        figure.savefig(path, dpi=120)
 
 
 def _extent() -> tuple[float, float, float, float]:

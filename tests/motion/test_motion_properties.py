@@ -58,9 +58,8 @@ def check_line(snapshots, arm):
     tips = np.array([s.arms[arm].tip_in_world.position_m for s in snapshots])
     for order, limit in ((1, 0.05), (2, 0.2), (3, 4.0)):
         rates = np.linalg.norm(np.diff(tips, order, axis=0), axis=1)
-        # Around a corner the jerks of both legs add up over the differences' width.
-        legs = 2.0 if order == 3 else 1.0
-        assert rates.max() <= legs * limit * DT**order * (1 + 1e-6) + 1e-12
+        # Differences are means of the derivatives over their width, around a corner too.
+        assert rates.max() <= limit * DT**order * (1 + 1e-6) + 1e-12
     down = matrix(CONTROLLER.arms[arm].tool_down_xyzw)
     for snapshot in snapshots:
         turned = matrix(snapshot.arms[arm].tip_in_world.quaternion_xyzw)

@@ -130,21 +130,31 @@ def test_inverse_is_exact_within_limits_or_refuses_by_joint(position, direction)
     )
 
 
-@pytest.mark.parametrize("joint", range(6))
-def test_inverse_names_the_joint_beyond_its_limit(joint):
+# The roll turns by more than a full turn: no pose is beyond its limits.
+@pytest.mark.parametrize(
+    ("joint", "beyond"),
+    [
+        *(
+            (joint, sign * by)
+            for joint, by in ((0, 1.7), (1, 1.0), (4, 1.45), (5, 1.45))
+            for sign in (1, -1)
+        ),
+        (2, 0.245),
+        (2, 0.055),
+    ],
+)
+def test_inverse_names_the_joint_beyond_its_limit(joint, beyond):
     joints = [0.2, 0.1, 0.12, 0.3, 0.2, -0.1]
-    inside = AT_ORIGIN.inverse(AT_ORIGIN.forward((0.2, 0.1, 0.12, 0.3, 0.2, -0.1)))
+    inside = AT_ORIGIN.inverse(AT_ORIGIN.forward(as_joints(joints)))
     np.testing.assert_allclose(inside, joints, atol=1e-12)
-    # The roll turns by more than a full turn: no pose is beyond its limits.
-    beyond = {0: 1.7, 1: 1.0, 2: 0.245, 4: 1.45, 5: -1.45}.get(joint)
-    if beyond is None:
-        return
     joints[joint] = beyond
     with pytest.raises(Unreachable) as refusal:
         AT_ORIGIN.inverse(AT_ORIGIN.forward(as_joints(joints)))
     assert refusal.value.joint == JOINTS[joint].name
     assert refusal.value.value == pytest.approx(beyond)
     assert (refusal.value.lower, refusal.value.upper) == (JOINTS[joint].lower, JOINTS[joint].upper)
+    for part in (JOINTS[joint].name, f"{beyond:.4f}", f"{JOINTS[joint].upper:.4f}"):
+        assert part in str(refusal.value)
 
 
 def as_joints(values: list[float]) -> Joints:
