@@ -77,6 +77,12 @@ def targets(report: Raw) -> list[tuple[str, str, bool]]:
             1.0,
             "",
         ),
+        (
+            "  of them by the controller itself <= 1",
+            (paced["late"] - paced["woken_late"]) * 1e4 / paced["ticks"],
+            1.0,
+            "",
+        ),
         ("tip off its line <= 1e-6 m", motions["off_line_m"], EXACT, "m"),
         ("tip off its target <= 1e-6 m", motions["off_target_m"], EXACT, "m"),
         ("tool turned <= 1e-6 rad", motions["turned_rad"], EXACT, "rad"),
