@@ -5,7 +5,7 @@ kinematics.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Any
 
@@ -28,6 +28,7 @@ TARGET_LOWER_M = (-0.01, -0.01, -0.005)
 TARGET_UPPER_M = (0.11, 0.13, 0.035)
 # A target may be refused for what is there already, such as the other instrument.
 MOST_REFUSALS = 200
+REDRAWS = 20
 
 
 @dataclass(frozen=True)
@@ -71,18 +72,24 @@ def random_goals(rng: np.random.Generator) -> Iterator[Goal]:
             number += 1
 
 
-def accept(controller: MotionController, goal: Goal, rng: np.random.Generator) -> tuple[Goal, int]:
-    """Execute a goal; a target that is refused is drawn again. Returns it and the refusals."""
+def accept(
+    controller: MotionController, goals: Iterator[Goal], rng: np.random.Generator
+) -> tuple[Goal, int]:
+    """Execute the next goal; a target that is refused is drawn again.
+
+    What is refused for good, for instance a pull where the other instrument is above, is left out.
+    Returns the goal that was accepted, and how many were refused before it.
+    """
+    goal = next(goals)
     for refusals in range(MOST_REFUSALS):
         try:
             controller.execute(goal)
-        except Refused as fault:
-            if goal.target_m is None:
-                raise SystemExit(f"{goal.name} of {goal.arm}: {fault}") from fault
-            goal = Goal(goal.goal_id, goal.name, goal.arm, None, draw_target(rng))
+        except Refused:
+            again = goal.target_m is not None and refusals % REDRAWS != REDRAWS - 1
+            goal = replace(goal, target_m=draw_target(rng)) if again else next(goals)
         else:
             return goal, refusals
-    raise SystemExit(f"{goal.name} of {goal.arm}: {MOST_REFUSALS} targets in a row were refused")
+    raise SystemExit(f"{MOST_REFUSALS} goals in a row were refused")
 
 
 def calm(controller: MotionController) -> Verdict:
@@ -105,14 +112,13 @@ class Recorder:
 
     def motion(self) -> Motion:
         """Do the next action to its end."""
-        goal = next(self._goals)
-        before = self.controller.snapshot.arms[goal.arm]
-        joints, jaw, phases = [before.setpoint_joints], [before.setpoint_jaw_rad], ["rest"]
         began_s = perf_counter()
-        goal, refused = accept(self.controller, goal, self.rng)
+        goal, refused = accept(self.controller, self._goals, self.rng)
         if not refused:
             self.accept_s.append(perf_counter() - began_s)
         self.refused += refused
+        before = self.controller.snapshot.arms[goal.arm]
+        joints, jaw, phases = [before.setpoint_joints], [before.setpoint_jaw_rad], ["rest"]
         result = None
         while result is None:
             verdict = calm(self.controller)

@@ -163,7 +163,7 @@ def paced_ticks(ticks: int, pace: float, seed: int, tell: Callable[[int], None])
     due_s, woken_late = 0.0, 0
     while len(lateness) < ticks:
         if not controller.wants_tick:
-            accept(controller, next(goals), rng)
+            accept(controller, goals, rng)
             due_s = perf_counter()
         sleep(max(0.0, due_s - perf_counter()))
         began_s = perf_counter()

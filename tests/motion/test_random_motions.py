@@ -1,6 +1,7 @@
 """A thousand random motions and stops, by kinematics that motion does not share."""
 
 import json
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,9 @@ from benchmarks.motion_stops import Stop, measure_stops, summary
 from benchmarks.motion_table import ROUNDING
 
 from fras_cli.bench import run_benchmark
+from fras_motion.controller import MotionController
 from fras_motion.parameters import MotionParameters
+from fras_motion.safety import GATES, GateRefused
 
 IDEAL = MotionParameters(driver_time_constant_s=0.0)
 EXACT = 1e-6
@@ -25,8 +28,9 @@ def motions() -> list[Motion]:
 
 def test_no_limit_is_exceeded_in_a_thousand_random_motions(motions):
     assert {motion.goal.arm for motion in motions} == {"psm1", "psm2"}
-    names = [motion.goal.name for motion in motions]
-    assert names == ["reach", "grasp", "pull", "move", "release"] * 200
+    counts = Counter(motion.goal.name for motion in motions)
+    assert set(counts) == {"reach", "grasp", "pull", "move", "release"}
+    assert min(counts.values()) > 100
     used = [used_limits(motion, IDEAL) for motion in motions]
     largest = {name: max(row[name] for row in used) for name in used[0]}
     assert max(largest.values()) <= 1.0 + ROUNDING
@@ -39,6 +43,26 @@ def test_no_limit_is_exceeded_in_a_thousand_random_motions(motions):
 def test_tips_keep_to_their_lines_and_tools_point_down(motions):
     strays = np.array([strayed(motion, IDEAL) for motion in motions])
     assert strays.max() <= EXACT
+
+
+@pytest.mark.parametrize(
+    ("axis", "most", "names"),
+    [(0, 0.07, {"reach", "grasp", "pull", "move", "release"}), (2, 0.06, {"reach", "grasp"})],
+)
+def test_what_a_gate_refuses_is_drawn_again_or_left_out(axis, most, names):
+    def fence(step, bounds):
+        del bounds
+        if step.tip_after.position_m[axis] > most:
+            raise GateRefused("fence", "xyz"[axis], step.tip_after.position_m[axis], 0.0, most)
+
+    recorder = Recorder(seed=2)
+    recorder.controller = MotionController(IDEAL, gates={**GATES, "fence": fence})
+    motions = [recorder.motion() for _ in range(20)]
+    assert recorder.refused > 0
+    assert names <= {motion.goal.name for motion in motions}
+    for motion in motions:
+        tips, _ = psm.forward(motion.joints, psm.BASES[motion.goal.arm])
+        assert tips[:, axis].max() <= most + EXACT
 
 
 def pull_of(motions: list[Motion]) -> Motion:
