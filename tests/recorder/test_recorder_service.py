@@ -10,9 +10,9 @@ from mcap.records import Channel, Message
 
 from fras_common.bus import RawSample, RemoteFault
 from fras_common.codec import content_digest, decode
-from fras_common.messages import CloseReply, Verdict
+from fras_common.messages import CloseReply, LastRequest, Verdict
 from fras_common.scenario import Scenario, to_toml
-from fras_common.topics import HEALTH
+from fras_common.topics import HEALTH, RECORDER_LAST
 from fras_recorder import service as recorder
 from fras_recorder.log_file import LogFile
 
@@ -274,3 +274,22 @@ def test_what_is_written_can_be_decoded(stage: Stage, tmp_path: Path):
             for _, _, message in make_reader(stream).iter_messages(topics=["sa/verdict"])
         ]
     assert decode(Verdict, payload, "sa/verdict") == sent
+
+
+def test_the_last_message_of_a_key_is_told_with_or_without_a_log(stage: Stage, tmp_path: Path):
+    stage.until("idle")
+    assert last(stage, "sa/verdict") == b""
+    stage.verdict(1)
+    # What was heard before the question is handled before it.
+    first = last(stage, "sa/verdict")
+    assert decode(Verdict, first, "sa/verdict").tick == 1
+    stage.open(tmp_path)
+    stage.until("recording")
+    assert last(stage, "sa/verdict") == first
+    stage.verdict(2)
+    stage.speaker.query(RECORDER_LAST, LastRequest(key="health/nobody"), 5.0)
+    assert decode(Verdict, last(stage, "sa/verdict"), "sa/verdict").tick == 2
+
+
+def last(stage: Stage, key: str) -> bytes:
+    return stage.speaker.query(RECORDER_LAST, LastRequest(key=key), 5.0).payload

@@ -92,6 +92,7 @@ TASK_STATUS = Topic(
 ACTION_RESULT = Topic(
     "motion/action_result", m.ActionResult, "motion", Qos.EVENT, "end of each action"
 )
+HOLDS = Topic("motion/holds", m.Holds, "motion", Qos.EVENT, "each change", in_trial=False)
 RECORDER_STATUS = Topic(
     "recorder/status", m.RecorderStatus, "recorder", Qos.EVENT, "each change", in_trial=False
 )
@@ -223,6 +224,7 @@ TOPICS: tuple[Topic[Any], ...] = (
     PLAN,
     TASK_STATUS,
     ACTION_RESULT,
+    HOLDS,
     RECORDER_STATUS,
     HEALTH,
     LOG,
@@ -244,6 +246,7 @@ SA_CONTEXT = Query("sa/context", m.ContextRequest, m.Context, "sa")
 SA_TARGET = Query("sa/target", m.TargetRequest, m.TargetReply, "sa")
 RECORDER_OPEN = Query("recorder/open", m.OpenRequest, m.ResetReply, "recorder")
 RECORDER_CLOSE = Query("recorder/close", m.CloseRequest, m.CloseReply, "recorder")
+RECORDER_LAST = Query("recorder/last", m.LastRequest, m.LastReply, "recorder")
 
 QUERIES: tuple[Query[Any, Any], ...] = (
     TASK,
@@ -259,6 +262,7 @@ QUERIES: tuple[Query[Any, Any], ...] = (
     SA_TARGET,
     RECORDER_OPEN,
     RECORDER_CLOSE,
+    RECORDER_LAST,
 )
 
 SERVICES: tuple[str, ...] = ("sim", "sa", "planner", "motion", "recorder")

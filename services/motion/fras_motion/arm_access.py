@@ -24,7 +24,8 @@ from fras_motion.trial import MotionTrial
 __all__ = ["ArmAccess", "PaceTooFast", "remote_arms", "simulated_arms"]
 
 # State commands that stop an arm; what leads back to ENABLED lifts their hold.
-_STOPS = ("pause", "disable")
+_STATES_BEHIND = {"pause": "PAUSED", "disable": "DISABLED"}
+_FAULT = "fault"
 _IDLE_S = 60.0
 
 
@@ -63,6 +64,10 @@ class ArmAccess(Protocol):
         """State of an arm by CRTK; an enabled one that somebody holds is paused."""
         ...
 
+    def restore(self, holds: Mapping[str, str]) -> None:
+        """Take over the states of the arms that stood behind holds of before this process."""
+        ...
+
     def wake(self, trial: MotionTrial | None, now_s: float) -> float:
         """Do what is due; return the seconds until it wants to be called again."""
         ...
@@ -93,6 +98,12 @@ class SimulatedArms:
         """State of an arm by CRTK."""
         return shown(self._direct.status(arm), held=bool(self._holds.current()))
 
+    def restore(self, holds: Mapping[str, str]) -> None:
+        """Take over the states that `pause`, `disable` and faults left."""
+        for arm in BASES_IN_WORLD:
+            if (command := holds.get(_holder(arm))) is not None:
+                self._direct.restore(arm, _STATES_BEHIND.get(command, "FAULT"))
+
     def wake(self, trial: MotionTrial | None, now_s: float) -> float:
         """Say where the arms are; while no trial runs, follow who leads them."""
         if self._trial is not None and not self._trial.runs:
@@ -121,7 +132,7 @@ class SimulatedArms:
             return wait_s
         self._pacer.ticked(now_s)
         for refusal in self._direct.tick(held=held):
-            self._holds.hold(f"crtk/{refusal.arm}", "fault")
+            self._holds.hold(_holder(refusal.arm), _FAULT)
             self._host.report_fault(f"{refusal.arm}/{refusal.command}", refusal)
         return self._pacer.wait_s(now_s)
 
@@ -138,8 +149,8 @@ class SimulatedArms:
             text = f"trial {self._trial.name!r} leads the arms"
             raise CommandRefused(arm, "state_command", "trial_runs", text, trial=self._trial.name)
         status = self._direct.state_command(arm, command)
-        holder = f"crtk/{arm}"
-        if command in _STOPS:
+        holder = _holder(arm)
+        if command in _STATES_BEHIND:
             self._holds.hold(holder, command)
         elif status.state == "ENABLED" and holder in self._holds.current():
             self._holds.resume(holder, by=holder)
@@ -168,6 +179,10 @@ class RemoteArms:
         status = ArmStatus(self._states.get(arm, "DISABLED"))
         return shown(status, held=bool(self._holds.current()))
 
+    def restore(self, holds: Mapping[str, str]) -> None:
+        """Nothing to take over: the other process says its states anew."""
+        del holds
+
     def wake(self, trial: MotionTrial | None, now_s: float) -> float:
         """Nothing is due: the other process says where its arms are."""
         del trial, now_s
@@ -184,6 +199,11 @@ class RemoteArms:
                 self._holds.resume(holder, by=holder)
 
         return on_state
+
+
+def _holder(arm: str) -> str:
+    """Owner of the hold that stands for an arm's own state."""
+    return f"crtk/{arm}"
 
 
 def simulated_arms(host: ServiceHost, holds: Holds) -> ArmAccess:

@@ -1,6 +1,7 @@
 """Holds: a set with owners, changed from any thread, read by the loop before it moves anything."""
 
 import threading
+from collections.abc import Callable, Mapping
 from typing import Final
 
 from fras_common.errors import FrasError
@@ -18,17 +19,30 @@ class UnknownHold(FrasError):
 
 
 class Holds:
-    """Who holds the arms, and why; thread-safe."""
+    """Who holds the arms, and why; thread-safe.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    on_change : callable, optional
+        Gets all holds after each change, in the order of the changes.
+    """
+
+    def __init__(self, on_change: Callable[[dict[str, str]], None] = lambda holds: None) -> None:
         self._lock = threading.Lock()
+        self._on_change = on_change
         self._reasons: dict[str, str] = {}
 
     def hold(self, holder: str, reason: str) -> dict[str, str]:
         """Add a hold; returns all that are in force."""
         with self._lock:
             self._reasons[holder] = reason
-            return dict(self._reasons)
+            return self._changed()
+
+    def restore(self, holds: Mapping[str, str]) -> dict[str, str]:
+        """Take over what was held before this process; holds of now stand. Returns all."""
+        with self._lock:
+            self._reasons = {**holds, **self._reasons}
+            return self._changed()
 
     def resume(self, holder: str, by: str) -> dict[str, str]:
         """Lift a hold; returns those still in force.
@@ -53,12 +67,17 @@ class Holds:
                     by=by,
                 )
             del self._reasons[holder]
-            return dict(self._reasons)
+            return self._changed()
 
     def current(self) -> dict[str, str]:
         """All holds in force."""
         with self._lock:
             return dict(self._reasons)
+
+    def _changed(self) -> dict[str, str]:
+        holds = dict(self._reasons)
+        self._on_change(dict(holds))
+        return holds
 
     def in_words(self) -> str:
         """Tell the holds in force; empty if there is none."""

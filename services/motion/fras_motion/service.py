@@ -1,6 +1,7 @@
 """Motion's shell: one tick for each verdict, holds at any time, and the trial's only wall clock."""
 
 import time
+from collections.abc import Mapping
 
 from fras_common import messages as m
 from fras_common.codec import content_digest
@@ -10,6 +11,7 @@ from fras_common.topics import (
     CANCEL,
     EXECUTE,
     HOLD,
+    HOLDS,
     MOTION_RESET,
     RESUME,
     ROBOT_STATE,
@@ -22,6 +24,7 @@ from fras_motion.holds import Holds
 from fras_motion.pacing import Pacer
 from fras_motion.patience import Patience
 from fras_motion.peers import Peers
+from fras_motion.restoring import Restoring
 from fras_motion.states import ActionResult
 from fras_motion.trial import MotionTrial
 
@@ -41,7 +44,8 @@ class MotionService:
 
     def __init__(self, host: ServiceHost, driver: str = SIMULATED) -> None:
         self._host = host
-        self._holds = Holds()
+        self._said_holds = host.publisher(HOLDS)
+        self._holds = Holds(lambda holds: self._say_holds(holds))
         self._trial: MotionTrial | None = None
         self._verdict: m.Verdict | None = None
         self._cancels: list[Deferred[m.CancelRequest, m.CancelReply]] = []
@@ -50,6 +54,7 @@ class MotionService:
         self._peers = Peers(host)
         make_arms = ARM_ACCESS[driver]
         self._arms: ArmAccess = make_arms(host, self._holds)
+        self._restoring = Restoring(host, self._restore_holds)
         self._state = host.publisher(ROBOT_STATE)
         self._result = host.publisher(ACTION_RESULT)
         host.subscribe(VERDICT, self._on_verdict)
@@ -95,6 +100,14 @@ class MotionService:
         self._host.post(lambda: self._host.log.info("held", by=request.holder))
         return m.HoldState(holds=holds, tick=self._host.tick)
 
+    def _say_holds(self, holds: dict[str, str]) -> None:
+        # Before the answer to whoever changed them: what is acknowledged survives this process.
+        self._said_holds.put(m.Holds(holds=holds))
+
+    def _restore_holds(self, holds: Mapping[str, str]) -> None:
+        self._holds.restore(holds)
+        self._arms.restore(holds)
+
     def _resume(self, request: m.ResumeRequest) -> m.HoldState:
         holds = self._holds.resume(request.holder, request.by)
         self._host.post(lambda: self._host.log.info("hold lifted", of=request.holder))
@@ -105,9 +118,12 @@ class MotionService:
 
     def wake(self) -> float | None:
         """Do the next tick if it is due; else see whether something has been missing too long."""
-        wait_s = self._wake_trial()
-        wait_arms_s = self._arms.wake(self._trial, time.monotonic())
-        return wait_arms_s if wait_s is None else min(wait_s, wait_arms_s)
+        waits_s = (
+            self._wake_trial(),
+            self._arms.wake(self._trial, time.monotonic()),
+            self._restoring.wake(),
+        )
+        return min(wait_s for wait_s in waits_s if wait_s is not None)
 
     def _wake_trial(self) -> float | None:
         self._host.facts["holds"] = self._holds.in_words()

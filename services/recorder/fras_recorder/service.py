@@ -5,10 +5,18 @@ import time
 from fras_common.bus import RawSample
 from fras_common.codec import content_digest
 from fras_common.errors import FrasError
-from fras_common.messages import CloseReply, CloseRequest, OpenRequest, RecorderStatus, ResetReply
+from fras_common.messages import (
+    CloseReply,
+    CloseRequest,
+    LastReply,
+    LastRequest,
+    OpenRequest,
+    RecorderStatus,
+    ResetReply,
+)
 from fras_common.messages.recorder import LogState
 from fras_common.service import Deferred, ServiceHost
-from fras_common.topics import RECORDER_CLOSE, RECORDER_OPEN, RECORDER_STATUS
+from fras_common.topics import RECORDER_CLOSE, RECORDER_LAST, RECORDER_OPEN, RECORDER_STATUS
 from fras_recorder.completeness import Completeness
 from fras_recorder.contents import open_log
 from fras_recorder.log_file import LogFile
@@ -33,9 +41,11 @@ class RecorderService:
         self._close_by_s = 0.0
         self._flush_at_s = 0.0
         self._last_arrival_s = 0.0
+        self._last: dict[str, bytes] = {}
         self._status = host.publisher(RECORDER_STATUS)
         host.serve(RECORDER_OPEN, self._open)
         host.serve_deferred(RECORDER_CLOSE, self._begin_close)
+        host.serve(RECORDER_LAST, self._tell_last)
         host.bus.subscribe_raw("**", self._on_sample)
         self._publish("idle")
 
@@ -44,6 +54,7 @@ class RecorderService:
         self._host.post(lambda: self._write(sample, arrival_ns))
 
     def _write(self, sample: RawSample, arrival_ns: int) -> None:
+        self._last[sample.key] = sample.payload
         if self._file is None:
             return
         self._last_arrival_s = time.monotonic()
@@ -67,6 +78,9 @@ class RecorderService:
         self._publish("recording")
         self._host.log.info("log opened", path=str(file.path), trial=request.trial)
         return ResetReply(digest=content_digest(request.trial, request.scenario, request.mesh))
+
+    def _tell_last(self, request: LastRequest) -> LastReply:
+        return LastReply(payload=self._last.get(request.key, b""))
 
     def _begin_close(self, pending: Deferred[CloseRequest, CloseReply]) -> None:
         if self._file is None or pending.request.trial != self._seen.trial:

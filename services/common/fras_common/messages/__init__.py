@@ -23,6 +23,7 @@ from fras_common.messages.motion import (
     ExecuteReply,
     ExecuteRequest,
     HoldRequest,
+    Holds,
     HoldState,
     ResumeRequest,
 )
@@ -37,7 +38,14 @@ from fras_common.messages.planner import (
     WhyNotReply,
     WhyNotRequest,
 )
-from fras_common.messages.recorder import CloseReply, CloseRequest, OpenRequest, RecorderStatus
+from fras_common.messages.recorder import (
+    CloseReply,
+    CloseRequest,
+    LastReply,
+    LastRequest,
+    OpenRequest,
+    RecorderStatus,
+)
 from fras_common.messages.robot import ActionState, ArmState, RobotState
 from fras_common.messages.sa import Context, ContextRequest, TargetReply, TargetRequest, Verdict
 from fras_common.messages.service import (
@@ -78,8 +86,11 @@ __all__ = [
     "HistoryStep",
     "HoldRequest",
     "HoldState",
+    "Holds",
     "JawState",
     "JointState",
+    "LastReply",
+    "LastRequest",
     "LogRecord",
     "NoPlan",
     "OpenRequest",

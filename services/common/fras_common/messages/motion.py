@@ -67,6 +67,12 @@ class ResumeRequest(Wire, frozen=True, kw_only=True):
     by: str
 
 
+class Holds(Header, frozen=True, kw_only=True):
+    """Everyone who holds the arms, holder to reason; latched, and restored by a new motion."""
+
+    holds: dict[str, str]
+
+
 class HoldState(Wire, frozen=True, kw_only=True):
     """Holds in force after the request, holder to reason, and the tick that was current."""
 

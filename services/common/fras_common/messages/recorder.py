@@ -23,6 +23,18 @@ class CloseRequest(Wire, frozen=True, kw_only=True):
     status_seq: int
 
 
+class LastRequest(Wire, frozen=True, kw_only=True):
+    """Ask for the last message of a key, in a trial or not."""
+
+    key: str
+
+
+class LastReply(Wire, frozen=True, kw_only=True):
+    """It as it travelled; empty if none was heard."""
+
+    payload: bytes
+
+
 class CloseReply(Wire, frozen=True, kw_only=True):
     """What the finished file holds."""
 

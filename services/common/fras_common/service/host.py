@@ -96,6 +96,7 @@ class ServiceHost:
         self._seqs: dict[str, int] = {}
         self._tokens: dict[str, set[str]] = defaultdict(set)
         self._inputs: set[str] = set()
+        self._unmet: set[str] = set()
         self._ready = False
         # A plain flag: a signal handler sets it, and an Event's lock is not reentrant.
         self._stopping = False
@@ -132,6 +133,16 @@ class ServiceHost:
     def require(self, *services: str) -> None:
         """Name services whose queries this one asks: it is not ready before they are there."""
         self._inputs.update(services)
+
+    def not_before(self, what: str) -> Callable[[], None]:
+        """Name something that has to be done before the service is ready; call the answer then."""
+        self._unmet.add(what)
+
+        def done() -> None:
+            self._unmet.discard(what)
+            self._become_ready()
+
+        return done
 
     def serve(self, query: Query[Req, Rep], handler: Callable[[Req], Rep]) -> None:
         """Answer each query on the loop with what `handler` returns, or the error it raises."""
@@ -331,7 +342,7 @@ class ServiceHost:
         self._become_ready()
 
     def _become_ready(self) -> None:
-        if self._ready or not self.present(f"alive/{self.name}"):
+        if self._ready or self._unmet or not self.present(f"alive/{self.name}"):
             return
         if all(self.present(f"alive/{producer}") for producer in self._inputs):
             self._ready = True

@@ -117,6 +117,11 @@ class DirectControl:
         arm.status = follow(name, arm.status, command)
         return arm.status
 
+    def restore(self, name: str, state: str) -> None:
+        """Put an arm's state machine where it stood before this process."""
+        arm = self._arms[name]
+        arm.status = replace(arm.status, state=state)
+
     def servo_jp(self, name: str, joints: Joints) -> None:
         """Want the joints to be somewhere with the next tick.
 

@@ -1,0 +1,69 @@
+"""What a motion that starts again must know: who held the arms before it."""
+
+from collections.abc import Callable, Mapping
+
+from fras_common.codec import MalformedMessage, decode
+from fras_common.errors import FrasError
+from fras_common.messages import Holds, LastReply, LastRequest
+from fras_common.service import ServiceHost
+from fras_common.topics import HOLDS, RECORDER_LAST
+
+__all__ = ["Restoring"]
+
+ANSWER_TIMEOUT_S = 2.0
+RETRY_S = 0.5
+
+
+class Restoring:
+    """Asks the recorder for the last holds, as soon as there is one, until it has answered.
+
+    The service is not ready before: no trial may begin that a person has stopped.
+
+    Parameters
+    ----------
+    host : ServiceHost
+    restore : callable
+        Gets the holds.
+    """
+
+    def __init__(self, host: ServiceHost, restore: Callable[[Mapping[str, str]], None]) -> None:
+        self._host = host
+        self._restore = restore
+        self._done = host.not_before("holds restored")
+        self._asking = False
+        self._is_done = False
+        host.require("recorder")
+
+    def wake(self) -> float | None:
+        """Ask if it is time to; seconds until it is again, or None."""
+        if self._is_done or self._asking:
+            return None
+        if not self._host.present("alive/recorder"):
+            return RETRY_S
+        self._asking = True
+        request = LastRequest(key=HOLDS.key)
+        self._host.bus.ask(RECORDER_LAST, request, self._on_answer, ANSWER_TIMEOUT_S)
+        return None
+
+    def _on_answer(self, answer: LastReply | FrasError) -> None:
+        self._host.post(lambda: self._take(answer))
+
+    def _take(self, answer: LastReply | FrasError) -> None:
+        self._asking = False
+        if isinstance(answer, FrasError):
+            self._host.log.warning("holds can't be restored yet", problem=str(answer))
+            return
+        self._is_done = True
+        if answer.payload:
+            self._restore_from(answer.payload)
+        self._done()
+
+    def _restore_from(self, payload: bytes) -> None:
+        try:
+            holds = decode(Holds, payload, HOLDS.key).holds
+        except MalformedMessage as error:
+            # Nobody can tell any more who held the arms: a person has to look.
+            holds = {"restart": f"the last holds can't be read: {error}"}
+        if holds:
+            self._host.log.warning("holds restored", holds=holds)
+            self._restore(holds)
