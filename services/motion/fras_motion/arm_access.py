@@ -19,6 +19,7 @@ from fras_motion.kinematics import BASES_IN_WORLD, HOME_TIPS_M, ArmKinematics
 from fras_motion.pacing import Pacer
 from fras_motion.parameters import MotionParameters
 from fras_motion.robots import home_setpoints, simulated_drivers
+from fras_motion.states import Goal
 from fras_motion.trial import MotionTrial
 
 __all__ = ["ArmAccess", "PaceTooFast", "remote_arms", "simulated_arms"]
@@ -80,6 +81,7 @@ class SimulatedArms:
         self._host = host
         self._holds = holds
         self._trial: MotionTrial | None = None
+        self._said: tuple[int, Goal | None, dict[str, str]] | None = None
         parameters = MotionParameters()
         kinematics = {name: ArmKinematics(base) for name, base in BASES_IN_WORLD.items()}
         home = home_setpoints(kinematics, HOME_TIPS_M, parameters)
@@ -110,22 +112,31 @@ class SimulatedArms:
             controller = self._trial.controller
             self._direct.take_over(controller.snapshot.arms, controller.drivers)
         self._trial = trial if trial is not None and trial.runs else None
-        held = bool(self._holds.current())
         if self._trial is not None:
-            snapshot, goal = self._trial.controller.snapshot, self._trial.goal
-            busy = {goal.arm: True} if goal is not None else {}
-            arms = {
-                name: replace(arm, operating_state=self.operating_state(name))
-                for name, arm in snapshot.arms.items()
-            }
-            self._face.publish(arms, busy, snapshot.tick, now_s)
-            return self._face.heartbeat_in_s(now_s)
+            return self._say_trial(self._trial, now_s)
+        held = bool(self._holds.current())
         wait_s = self._face.heartbeat_in_s(now_s)
         if self._direct.moving:
             wait_s = min(wait_s, self._tick(held=held, now_s=now_s))
         arms = self._direct.snapshot(held=held)
         self._face.publish(arms, {arm: self._direct.busy(arm) for arm in arms}, -1, now_s)
         return wait_s
+
+    def _say_trial(self, trial: MotionTrial, now_s: float) -> float:
+        """Say where the trial's arms are, once for each of its ticks."""
+        heartbeat_s = self._face.heartbeat_in_s(now_s)
+        moment = (trial.tick, trial.goal, self._holds.current())
+        if moment == self._said and heartbeat_s > 0.0:
+            return heartbeat_s
+        busy = {trial.goal.arm: True} if trial.goal is not None else {}
+        arms = {
+            name: replace(arm, operating_state=self.operating_state(name))
+            for name, arm in trial.controller.snapshot.arms.items()
+        }
+        if not self._face.publish(arms, busy, trial.tick, now_s):
+            return self._face.due_in_s(now_s)
+        self._said = moment
+        return self._face.heartbeat_in_s(now_s)
 
     def _tick(self, *, held: bool, now_s: float) -> float:
         if (wait_s := self._pacer.wait_s(now_s)) > 0.0:

@@ -77,7 +77,7 @@ class CrtkFace:
 
     def publish(
         self, arms: Mapping[str, ArmState], busy: Mapping[str, bool], tick: int, now_s: float
-    ) -> None:
+    ) -> bool:
         """Say where the arms are, if it is time to; a change of state is always said.
 
         Parameters
@@ -89,6 +89,11 @@ class CrtkFace:
             Of the trial, or -1.
         now_s : float
             Monotonic clock.
+
+        Returns
+        -------
+        bool
+            Whether it was said; else it was too early.
         """
         heartbeat = now_s >= self._heartbeat_s
         for name, arm in arms.items():
@@ -99,14 +104,20 @@ class CrtkFace:
                 self._arms[name].say_state(state, tick)
         if heartbeat:
             self._heartbeat_s = now_s + HEARTBEAT_S
-        if heartbeat or now_s >= self._due_s:
-            self._due_s = now_s + PERIOD_S
-            for name, arm in arms.items():
-                self._arms[name].say_where(arm, tick)
+        if not heartbeat and now_s < self._due_s:
+            return False
+        self._due_s = now_s + PERIOD_S
+        for name, arm in arms.items():
+            self._arms[name].say_where(arm, tick)
+        return True
 
     def heartbeat_in_s(self, now_s: float) -> float:
         """Seconds until the arms must say again where they are."""
         return max(0.0, self._heartbeat_s - now_s)
+
+    def due_in_s(self, now_s: float) -> float:
+        """Seconds until the arms may say again where they are."""
+        return max(0.0, self._due_s - now_s)
 
     def _servo_jp(self, arm: str, command: m.ServoJoints) -> None:
         self._permit(arm, "servo_jp")
