@@ -221,6 +221,11 @@ def test_absent_values_are_left_out_of_the_file():
         ({"motion": {"free_speed_m_s": 0.2}}, "motion.free_speed_m_s"),
         ({"motion": {"jaw_speed_rad_s": 3.0}}, "motion.jaw_speed_rad_s"),
         ({"motion": {"retreat_max_m": 0.0}}, "motion.retreat_max_m"),
+        ({"motion": {"instrument_clearance_m": 0.04}}, "motion.instrument_clearance_m"),
+        (
+            {"motion": {"forbidden_boxes": [{"lower_m": [0, 0, 0], "upper_m": [0.1, 0, 0.1]}]}},
+            "motion.forbidden_boxes[0].upper_m",
+        ),
         (
             {"awareness": {"visible_distance_m": 0.004}, "generator": {"roi_depth_m": 0.005}},
             "awareness.visible_distance_m",

@@ -55,8 +55,21 @@ def made_possible(scenario: Scenario) -> Scenario:
     tissue = replace(
         tissue, bed=True, node_counts=tuple(min(count, 40) for count in tissue.node_counts)
     )
+    boxes = tuple(
+        replace(
+            box,
+            lower_m=tuple(
+                max(-1.0, min(pair) - 0.01) for pair in zip(box.lower_m, box.upper_m, strict=True)
+            ),
+            upper_m=tuple(
+                min(1.0, max(pair) + 0.01) for pair in zip(box.lower_m, box.upper_m, strict=True)
+            ),
+        )
+        for box in motion.forbidden_boxes
+    )
     motion = replace(
         motion,
+        forbidden_boxes=boxes,
         jaw_speed_rad_s=min(motion.jaw_speed_rad_s, 100 * tissue.dt_s),
         stop_deceleration_m_s2=deceleration,
         free_speed_m_s=min(motion.free_speed_m_s, fastest),

@@ -180,6 +180,22 @@ def test_move_cp_may_turn_on_the_spot(arms: DirectControl) -> None:
     assert angle(poses[-1].quaternion_xyzw, turn(-40.0)) <= 1e-6
 
 
+def test_two_arms_led_at_once_do_not_meet(arms: DirectControl) -> None:
+    refused: set[str] = set()
+    for _ in range(60):
+        for name, step in (("psm1", 0.0009), ("psm2", -0.0009)):
+            x, y, z = tip(arms, name).position_m
+            try:
+                arms.servo_cp(name, Pose((x, y + step, z), DOWN))
+            except CommandRefused as error:
+                refused.add(error.reason)
+        arms.tick(held=False)
+    # Two jaws of 6 mm and the clearance of 2 mm; each was told where the other one was to go.
+    apart = dist(tip(arms).position_m, tip(arms, "psm2").position_m)
+    assert 0.014 <= apart < 0.016
+    assert "instrument_distance" in refused
+
+
 def test_a_move_to_where_the_arm_is_does_nothing(arms: DirectControl) -> None:
     arms.move_cp("psm1", tip(arms))
     assert not arms.busy("psm1")
@@ -190,7 +206,8 @@ def test_a_move_to_where_the_arm_is_does_nothing(arms: DirectControl) -> None:
     [
         (Pose((0.03, 0.02, -0.02), DOWN), "workspace"),
         (Pose((0.03, 0.02, 0.9), DOWN), "unreachable"),
-        (Pose((0.05, 0.135, 0.03), DOWN), "workspace"),
+        (Pose((0.05, -0.015, 0.03), DOWN), "workspace"),
+        (Pose((0.05, 0.135, 0.03), DOWN), "instrument_distance"),  # psm2 is on its way
         (Pose(THERE, turn(180.0)), None),
     ],
 )

@@ -8,13 +8,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fras_motion.controller import MotionController
-from fras_motion.kinematics import JOINTS, matrix
+from fras_motion.kinematics import BASES_IN_WORLD, JOINTS, matrix
 from fras_motion.parameters import MotionParameters
 from fras_motion.states import Goal, Verdict
 
 PARAMETERS = MotionParameters(driver_time_constant_s=0.0)
 DT = PARAMETERS.dt_s
-CONTROLLER = MotionController(PARAMETERS)
+# One arm each, so that it may go anywhere; both together: test_two_instruments.py.
+ALONE = {arm: MotionController(PARAMETERS, {arm: base}) for arm, base in BASES_IN_WORLD.items()}
 arms = st.sampled_from(["psm1", "psm2"])
 points = st.tuples(st.floats(0.0, 0.1), st.floats(0.0, 0.12), st.floats(0.0, 0.03))
 
@@ -60,7 +61,7 @@ def check_line(snapshots, arm):
         rates = np.linalg.norm(np.diff(tips, order, axis=0), axis=1)
         # Differences are means of the derivatives over their width, around a corner too.
         assert rates.max() <= limit * DT**order * (1 + 1e-6) + 1e-12
-    down = matrix(CONTROLLER.arms[arm].tool_down_xyzw)
+    down = matrix(ALONE[arm].arms[arm].tool_down_xyzw)
     for snapshot in snapshots:
         turned = matrix(snapshot.arms[arm].tip_in_world.quaternion_xyzw)
         assert np.abs(turned - down).max() <= 1e-6
@@ -77,8 +78,9 @@ def check_line(snapshots, arm):
 @given(arms, points, points)
 @settings(max_examples=40, deadline=None)
 def test_limits_are_never_exceeded_and_the_tip_stays_on_its_line(arm, first, second):
-    CONTROLLER.reset()
-    snapshots = play(CONTROLLER, retraction(arm, first, second))
+    controller = ALONE[arm]
+    controller.reset()
+    snapshots = play(controller, retraction(arm, first, second))
     np.testing.assert_allclose(snapshots[-1].arms[arm].tip_in_world.position_m, second, atol=1e-6)
     check_limits(snapshots, arm)
     check_line(snapshots, arm)
@@ -87,19 +89,20 @@ def test_limits_are_never_exceeded_and_the_tip_stays_on_its_line(arm, first, sec
 @given(arms, points, st.integers(0, 150))
 @settings(max_examples=60, deadline=None)
 def test_hold_at_any_tick_rests_within_two_ticks_and_the_braking_distance(arm, target, when):
-    CONTROLLER.resume("page")
-    CONTROLLER.reset()
-    CONTROLLER.execute(Goal("1", "reach", arm, None, target))
-    tips = [np.array(CONTROLLER.snapshot.arms[arm].tip_in_world.position_m)]
-    while CONTROLLER.wants_tick and CONTROLLER.snapshot.tick < when:
-        snapshot = CONTROLLER.advance(Verdict(CONTROLLER.snapshot.tick)).snapshot
+    controller = ALONE[arm]
+    controller.resume("page")
+    controller.reset()
+    controller.execute(Goal("1", "reach", arm, None, target))
+    tips = [np.array(controller.snapshot.arms[arm].tip_in_world.position_m)]
+    while controller.wants_tick and controller.snapshot.tick < when:
+        snapshot = controller.advance(Verdict(controller.snapshot.tick)).snapshot
         tips.append(np.array(snapshot.arms[arm].tip_in_world.position_m))
-    CONTROLLER.hold("page", "stop")
-    held = CONTROLLER.snapshot.tick
-    while CONTROLLER.wants_tick:
-        snapshot = CONTROLLER.advance(Verdict(CONTROLLER.snapshot.tick)).snapshot
-    assert CONTROLLER.snapshot.tick - held <= 2
-    rest = np.array(CONTROLLER.snapshot.arms[arm].tip_in_world.position_m)
+    controller.hold("page", "stop")
+    held = controller.snapshot.tick
+    while controller.wants_tick:
+        snapshot = controller.advance(Verdict(controller.snapshot.tick)).snapshot
+    assert controller.snapshot.tick - held <= 2
+    rest = np.array(controller.snapshot.arms[arm].tip_in_world.position_m)
     travelled = np.linalg.norm(rest - tips[-1])
     # The speed at the hold is at most the mean speed of the tick before plus what a tick adds.
     before = np.linalg.norm(tips[-1] - tips[-2]) / DT if len(tips) > 1 else 0.0

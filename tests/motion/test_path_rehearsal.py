@@ -17,7 +17,7 @@ BOUNDS = MotionParameters().bounds
 
 
 def walk(profile):
-    rehearse((LineStroke("lift", profile, 1.25, LINE, ARM),), START, ARM, 0.02, GATES, BOUNDS)
+    rehearse((LineStroke("lift", profile, 1.25, LINE, ARM),), START, ARM, 0.02, GATES, BOUNDS, {})
 
 
 def test_planned_line_passes():

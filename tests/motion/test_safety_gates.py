@@ -4,10 +4,11 @@ from math import inf, nan, radians
 import pytest
 
 from fras_motion.drivers import Setpoint
-from fras_motion.kinematics import BASES_IN_WORLD, JOINTS, ArmKinematics, Pose
+from fras_motion.kinematics import BASES_IN_WORLD, JOINTS, ArmKinematics, Instrument, Pose
 from fras_motion.parameters import MotionParameters
 from fras_motion.safety import (
     GATES,
+    Box,
     GateRefused,
     Reaction,
     Step,
@@ -16,11 +17,13 @@ from fras_motion.safety import (
     required_reaction,
 )
 
-BOUNDS = MotionParameters().bounds
+FORBIDDEN = Box((0.0, 0.0, -0.005), (0.02, 0.02, 0.03))
+BOUNDS = MotionParameters(forbidden_boxes=(FORBIDDEN,)).bounds
 ARM = ArmKinematics(BASES_IN_WORLD["psm1"])
 TIP = Pose((0.05, 0.03, 0.06), ARM.tool_down_xyzw)
 HERE = Setpoint(ARM.inverse(TIP), 1.0)
-STAND = Step(0.02, HERE, HERE, TIP, TIP, ARM.tool_down_xyzw)
+BODY = ARM.instrument(HERE.joints, TIP)
+STAND = Step(0.02, HERE, HERE, TIP, TIP, ARM.tool_down_xyzw, BODY, BODY, {})
 
 
 def moved(setpoint: Setpoint, joint: int, value: float) -> Setpoint:
@@ -40,6 +43,18 @@ def turned(angle: float) -> Pose:
     x, y, _, _ = TIP.quaternion_xyzw
     half = angle / 2  # about the world's z, before the tool's own half turn
     return replace(TIP, quaternion_xyzw=(x - half * y, y + half * x, 0.0, 0.0))
+
+
+def shifted(x: float, y: float = 0.0, z: float = 0.0) -> Instrument:
+    """The instrument, as a whole elsewhere."""
+    return Instrument(
+        *((a + x, b + y, c + z) for a, b, c in (BODY.remote_centre_m, BODY.wrist_m, BODY.tip_m))
+    )
+
+
+# Two jaws of 6 mm and the clearance of 2 mm.
+NEAREST = 0.014
+LOST = Instrument(BODY.remote_centre_m, (nan, nan, nan), (nan, nan, nan))
 
 
 # Each step offends one gate alone.
@@ -78,6 +93,17 @@ OFFENCES = {
     ],
     "cartesian_speed": [replace(STAND, tip_after=replace(TIP, position_m=(0.05101, 0.03, 0.06)))],
     "orientation": [replace(STAND, tip_after=turned(2e-6))],
+    "instrument_distance": [
+        replace(STAND, instrument_after=shifted(1e-6), others={"psm2": shifted(NEAREST)}),
+        replace(STAND, instrument_before=shifted(-0.1), others={"psm2": shifted(0.0)}),
+        replace(STAND, others={"psm3": shifted(1.0), "psm2": LOST}),
+    ],
+    "forbidden_box": [
+        # The tip from above, and the shaft from the side.
+        replace(STAND, instrument_after=shifted(-0.035, -0.015, -0.0241)),
+        replace(STAND, instrument_after=shifted(-0.0261, -0.01, -0.075)),
+        replace(STAND, instrument_before=LOST, instrument_after=LOST),
+    ],
 }
 CASES = [(name, step) for name, steps in OFFENCES.items() for step in steps]
 
@@ -116,6 +142,29 @@ def test_gates_let_pass_what_is_just_allowed():
     )
     for gate in GATES.values():
         gate(step, BOUNDS)
+
+
+def test_instruments_may_be_as_near_as_the_clearance():
+    GATES["instrument_distance"](replace(STAND, others={"psm2": shifted(NEAREST + 1e-9)}), BOUNDS)
+
+
+@pytest.mark.parametrize("there", [shifted(0.010), shifted(-0.003, 0.006)])
+def test_instruments_that_are_too_near_may_stand_and_part_but_not_approach(there):
+    near = replace(STAND, others={"psm2": there})
+    GATES["instrument_distance"](near, BOUNDS)
+    away = 1 if there.tip_m[0] < BODY.tip_m[0] else -1
+    GATES["instrument_distance"](replace(near, instrument_after=shifted(away * 1e-6)), BOUNDS)
+    with pytest.raises(GateRefused, match=r"distance to psm2 \[m\] would be"):
+        GATES["instrument_distance"](replace(near, instrument_after=shifted(away * -1e-6)), BOUNDS)
+
+
+def test_instrument_in_a_box_may_leave_it_but_not_go_deeper():
+    inside = replace(STAND, instrument_before=shifted(-0.035, -0.015, -0.026))
+    deeper = replace(inside, instrument_after=shifted(-0.035, -0.015, -0.027))
+    leaving = replace(inside, instrument_after=shifted(-0.035, -0.015, -0.025))
+    GATES["forbidden_box"](leaving, BOUNDS)
+    with pytest.raises(GateRefused, match=r"box \(0.0, 0.0, -0.005\) .. \(0.02, 0.02, 0.03\)"):
+        GATES["forbidden_box"](deeper, BOUNDS)
 
 
 def test_orientation_is_the_same_with_either_sign_of_the_quaternion():

@@ -9,6 +9,7 @@ from fras_common.messages.motion import ActionOutcome
 from fras_common.messages.robot import Joints
 from fras_common.scenario import Scenario
 from fras_motion.parameters import MotionParameters
+from fras_motion.safety import Box
 from fras_motion.states import ActionResult, ArmState, Goal, Snapshot, Verdict
 
 
@@ -32,6 +33,8 @@ def parameters_of(scenario: Scenario) -> MotionParameters:
         driver_noise_rad=motion.joint_noise_rad,
         driver_noise_m=motion.insertion_noise_m,
         driver_seed=scenario.seed,
+        instrument_clearance_m=motion.instrument_clearance_m,
+        forbidden_boxes=tuple(Box(box.lower_m, box.upper_m) for box in motion.forbidden_boxes),
     )
 
 

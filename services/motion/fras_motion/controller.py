@@ -4,15 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from itertools import product
 from math import isfinite
 
 from fras_motion.drivers import Driver, DriverFault, Measured
-from fras_motion.kinematics import BASES_IN_WORLD, HOME_TIPS_M, ArmKinematics, Pose, Unreachable
-from fras_motion.safety import GATES, Gate, GateRefused, Step
+from fras_motion.kinematics import (
+    BASES_IN_WORLD,
+    HOME_TIPS_M,
+    ArmKinematics,
+    Instrument,
+    Pose,
+    Unreachable,
+)
+from fras_motion.safety import GATES, Gate, GateRefused, Step, box_distance_m
 from fras_motion.trajectory import ProfileImpossible
 
 from .course import Course, Ending, Progress
-from .errors import NoTickWanted, Refused, StaleVerdict
+from .errors import InvalidParameter, NoTickWanted, Refused, StaleVerdict
 from .parameters import MotionParameters
 from .primitives import PRIMITIVES, Posture
 from .rehearsal import rehearse
@@ -42,6 +50,8 @@ class MotionController:
     ------
     Unreachable
         An arm can't be at its home.
+    InvalidParameter
+        A forbidden box reaches an arm at its home.
     """
 
     def __init__(
@@ -60,6 +70,9 @@ class MotionController:
         self._home = home_setpoints(self.arms, home_tips_m, p)
         self._holds: dict[str, str] = {}
         self.reset()
+        for box, instrument in product(p.forbidden_boxes, self._instruments.values()):
+            if not box_distance_m(instrument, box.lower_m, box.upper_m) >= 0.0:
+                raise InvalidParameter("forbidden_boxes", box, "no box reaches an arm at its home")
 
     def reset(self) -> Snapshot:
         """Back to tick 0, the arms at home. Holds stay: a reset is no surgeon's consent.
@@ -75,6 +88,10 @@ class MotionController:
         }
         self._tips = {
             name: self.arms[name].forward(setpoint.joints)
+            for name, setpoint in self._setpoints.items()
+        }
+        self._instruments = {
+            name: self.arms[name].instrument(setpoint.joints, self._tips[name])
             for name, setpoint in self._setpoints.items()
         }
         self._grasp_heights: dict[str, float] = {}
@@ -266,7 +283,13 @@ class MotionController:
         try:
             strokes = PRIMITIVES[goal.name](goal, posture, self._parameters)
             rehearse(
-                strokes, posture.setpoint, arm, self._parameters.dt_s, self._gates, self._bounds
+                strokes,
+                posture.setpoint,
+                arm,
+                self._parameters.dt_s,
+                self._gates,
+                self._bounds,
+                self._others(goal.arm),
             )
         except Unreachable as fault:
             raise Refused("unreachable", str(fault), **fault.values) from fault
@@ -279,13 +302,20 @@ class MotionController:
     def _checked(self, course: Course, verdict: Verdict) -> Progress:
         """Let the action step; a step that fails a gate is not sent and ends the action."""
         name = course.goal.arm
-        before, tip = self._setpoints[name], self._tips[name]
-        arm = self.arms[name]
+        before, arm = self._setpoints[name], self.arms[name]
         try:
             progress = course.step(verdict, before, bool(self._holds))
             after = arm.forward(progress.setpoint.joints)
             step = Step(
-                self._parameters.dt_s, before, progress.setpoint, tip, after, arm.tool_down_xyzw
+                dt_s=self._parameters.dt_s,
+                before=before,
+                after=progress.setpoint,
+                tip_before=self._tips[name],
+                tip_after=after,
+                orientation_xyzw=arm.tool_down_xyzw,
+                instrument_before=self._instruments[name],
+                instrument_after=arm.instrument(progress.setpoint.joints, after),
+                others=self._others(name),
             )
             for gate in self._gates.values():
                 gate(step, self._bounds)
@@ -293,8 +323,12 @@ class MotionController:
             return Progress(before, "interrupted", Ending("aborted", f"gate:{fault.gate}"))
         except Unreachable:
             return Progress(before, "interrupted", Ending("aborted", "gate:unreachable"))
-        self._setpoints[name], self._tips[name] = progress.setpoint, after
+        self._setpoints[name], self._tips[name] = step.after, step.tip_after
+        self._instruments[name] = step.instrument_after
         return progress
+
+    def _others(self, name: str) -> dict[str, Instrument]:
+        return {other: one for other, one in self._instruments.items() if other != name}
 
     def _remember_grasp(self, name: str) -> None:
         """Note the height at which a jaw closed: at the crossing, where the simulator grasps."""

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from math import isfinite, radians
+from math import inf, isfinite, radians
 
 from fras_motion.kinematics import JAW_LOWER_RAD, JAW_UPPER_RAD, Vector3
-from fras_motion.safety import Bounds
+from fras_motion.safety import Bounds, Box
 
 from .errors import InvalidParameter
 
@@ -60,6 +60,10 @@ class MotionParameters:
         The simulated arms, see `fras_motion.drivers.SimulatedDriver`; psm2 has the next seed.
     workspace_lower_m, workspace_upper_m : tuple of float, length 3
         Corners of the box the tips stay in, world frame.
+    instrument_clearance_m : float
+        Smallest distance between two instruments.
+    forbidden_boxes : tuple of Box
+        Where no part of an instrument may be, world frame.
     """
 
     dt_s: float = 0.02
@@ -88,9 +92,13 @@ class MotionParameters:
     driver_seed: int = 0
     workspace_lower_m: Vector3 = (-0.01, -0.01, -0.005)
     workspace_upper_m: Vector3 = (0.11, 0.13, 0.09)
+    instrument_clearance_m: float = 0.002
+    forbidden_boxes: tuple[Box, ...] = ()
 
     def __post_init__(self) -> None:
         for field in fields(self):
+            if field.name == "forbidden_boxes":
+                continue
             value: float | Vector3 = getattr(self, field.name)
             if isinstance(value, tuple):
                 if not all(isfinite(coordinate) for coordinate in value):
@@ -106,11 +114,15 @@ class MotionParameters:
         self._check_jaw()
         if self.retreat_force_ratio > 1.0:
             raise InvalidParameter("retreat_force_ratio", self.retreat_force_ratio, "at most 1")
-        pairs = zip(self.workspace_lower_m, self.workspace_upper_m, strict=True)
-        if not all(lower < upper for lower, upper in pairs):
+        if not _ordered(self.workspace_lower_m, self.workspace_upper_m):
             raise InvalidParameter(
                 "workspace_upper_m", self.workspace_upper_m, "above workspace_lower_m on each axis"
             )
+        for box in self.forbidden_boxes:
+            if not _ordered(box.lower_m, box.upper_m):
+                raise InvalidParameter(
+                    "forbidden_boxes", box, "finite corners, upper_m above lower_m on each axis"
+                )
 
     def _check_stops(self) -> None:
         two_ticks = 2.0 * self.dt_s * (1.0 + 1e-9)
@@ -147,4 +159,11 @@ class MotionParameters:
             self.workspace_upper_m,
             max(self.free_speed_m_s, self.holding_speed_m_s),
             self.jaw_speed_rad_s,
+            self.instrument_clearance_m,
+            self.forbidden_boxes,
         )
+
+
+def _ordered(lower_m: Vector3, upper_m: Vector3) -> bool:
+    pairs = zip(lower_m, upper_m, strict=True)
+    return all(lower < upper < inf and lower > -inf for lower, upper in pairs)

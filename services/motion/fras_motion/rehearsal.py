@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from fras_motion.drivers import Setpoint
-from fras_motion.kinematics import ArmKinematics
+from fras_motion.kinematics import ArmKinematics, Instrument
 from fras_motion.safety import Bounds, Gate, Step, joint_accelerations
 
 from .strokes import Stroke
@@ -20,6 +20,7 @@ def rehearse(
     dt_s: float,
     gates: Mapping[str, Gate],
     bounds: Bounds,
+    others: Mapping[str, Instrument],
 ) -> None:
     """Send every setpoint of a path through the gates, as it will be sent.
 
@@ -37,6 +38,8 @@ def rehearse(
         What each step has to pass.
     bounds : Bounds
         What the gates hold it against.
+    others : mapping of str to Instrument
+        Every other arm -> its instrument, which stands.
 
     Raises
     ------
@@ -47,13 +50,26 @@ def rehearse(
     """
     earlier, before = start, start
     tip_before = arm.forward(start.joints)
+    instrument_before = arm.instrument(start.joints, tip_before)
     for stroke in strokes:
         for s in stroke.profile.positions:
             after = stroke.setpoint(s, before)
             tip_after = arm.forward(after.joints)
-            step = Step(dt_s, before, after, tip_before, tip_after, arm.tool_down_xyzw)
+            instrument_after = arm.instrument(after.joints, tip_after)
+            step = Step(
+                dt_s=dt_s,
+                before=before,
+                after=after,
+                tip_before=tip_before,
+                tip_after=tip_after,
+                orientation_xyzw=arm.tool_down_xyzw,
+                instrument_before=instrument_before,
+                instrument_after=instrument_after,
+                others=others,
+            )
             for gate in gates.values():
                 gate(step, bounds)
             joint_accelerations(earlier, before, after, dt_s)
-            earlier, before, tip_before = before, after, tip_after
+            earlier, before = before, after
+            tip_before, instrument_before = tip_after, instrument_after
     joint_accelerations(earlier, before, before, dt_s)

@@ -6,6 +6,7 @@ from fras_common.scenario.loader import ScenarioError, check, load, to_toml
 from fras_common.scenario.mesh import MeshFacts, fit_to_mesh
 from fras_common.scenario.model import (
     AwarenessSection,
+    Box,
     Disc,
     GeneratorSection,
     MotionSection,
@@ -18,6 +19,7 @@ from fras_common.scenario.model import (
 
 __all__ = [
     "AwarenessSection",
+    "Box",
     "Disc",
     "GeneratorSection",
     "MeshFacts",

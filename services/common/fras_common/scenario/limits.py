@@ -62,6 +62,13 @@ def _motion(scenario: Scenario) -> Iterator[Breach]:
             motion.jaw_speed_rad_s,
             f"a stop must end within two ticks: at most {fastest:.4g}",
         )
+    for index, box in enumerate(motion.forbidden_boxes):
+        if not all(a < b for a, b in zip(box.lower_m, box.upper_m, strict=True)):
+            yield (
+                f"motion.forbidden_boxes[{index}].upper_m",
+                list(box.upper_m),
+                f"above lower_m = {list(box.lower_m)} on each axis",
+            )
 
 
 def _awareness(scenario: Scenario) -> Iterator[Breach]:

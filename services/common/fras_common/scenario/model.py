@@ -144,6 +144,13 @@ class PlannerSection(Section, frozen=True, kw_only=True):
     time_limit_s: Annotated[float, Meta(gt=0, le=600)] = 5.0
 
 
+class Box(Section, frozen=True, kw_only=True):
+    """A box along the axes of the world."""
+
+    lower_m: tuple[Coordinate, Coordinate, Coordinate]
+    upper_m: tuple[Coordinate, Coordinate, Coordinate]
+
+
 class MotionSection(Section, frozen=True, kw_only=True):
     """Speeds and limits of the arms.
 
@@ -153,6 +160,10 @@ class MotionSection(Section, frozen=True, kw_only=True):
         Lag and dead time of simulated arms.
     joint_noise_rad, insertion_noise_m : float
         Standard deviation of what simulated arms measure; drawn from the scenario's seed.
+    instrument_clearance_m : float
+        Smallest distance between the surfaces of the two instruments.
+    forbidden_boxes : tuple of Box
+        Where no part of an instrument may be.
     """
 
     free_speed_m_s: Annotated[float, Meta(gt=0, le=0.5)] = 0.05
@@ -168,6 +179,8 @@ class MotionSection(Section, frozen=True, kw_only=True):
     joint_delay_s: Annotated[float, Meta(ge=0, le=1)] = 0.0
     joint_noise_rad: Annotated[float, Meta(ge=0, le=0.1)] = 0.0
     insertion_noise_m: Annotated[float, Meta(ge=0, le=0.01)] = 0.0
+    instrument_clearance_m: Annotated[float, Meta(gt=0, le=0.03)] = 0.002
+    forbidden_boxes: tuple[Box, ...] = ()
 
 
 class RunSection(Section, frozen=True, kw_only=True):

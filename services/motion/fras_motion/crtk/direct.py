@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from fras_motion.course import Course
 from fras_motion.drivers import Driver, Measured, Setpoint
-from fras_motion.kinematics import ArmKinematics, Joints, Pose, Unreachable
+from fras_motion.kinematics import ArmKinematics, Instrument, Joints, Pose, Unreachable
 from fras_motion.parameters import MotionParameters
 from fras_motion.rehearsal import rehearse
 from fras_motion.safety import GATES, Gate, GateRefused, Step
@@ -164,7 +164,15 @@ class DirectControl:
             stroke = TurningStroke(
                 profile, p.stop_deceleration_m_s2, start, tip_in_world, arm.kinematics
             )
-            rehearse((stroke,), arm.setpoint, arm.kinematics, p.dt_s, self._gates, self._bounds)
+            rehearse(
+                (stroke,),
+                arm.setpoint,
+                arm.kinematics,
+                p.dt_s,
+                self._gates,
+                self._bounds,
+                self._others(arm),
+            )
         arm.wanted = None
         arm.course = Course(Goal("", "move_cp", name), (stroke,), p)
 
@@ -242,21 +250,42 @@ class DirectControl:
     def _check(self, arm: _Arm, after: Setpoint, dt_s: float) -> None:
         kinematics = arm.kinematics
         # NaN has no pose: its gate is asked first.
+        tip_before = kinematics.forward(arm.setpoint.joints)
+        tip_after = kinematics.forward(after.joints)
         step = Step(
-            dt_s,
-            arm.setpoint,
-            after,
-            kinematics.forward(arm.setpoint.joints),
-            kinematics.forward(after.joints),
-            kinematics.tool_down_xyzw,
+            dt_s=dt_s,
+            before=arm.setpoint,
+            after=after,
+            tip_before=tip_before,
+            tip_after=tip_after,
+            orientation_xyzw=kinematics.tool_down_xyzw,
+            instrument_before=kinematics.instrument(arm.setpoint.joints, tip_before),
+            instrument_after=kinematics.instrument(after.joints, tip_after),
+            others=self._others(arm),
         )
         for gate in self._gates.values():
             gate(step, self._bounds)
+
+    def _others(self, arm: _Arm) -> dict[str, Instrument]:
+        """Where the other arms are, and where they will be after the next tick."""
+        others: dict[str, Instrument] = {}
+        for name, other in self._arms.items():
+            if other is arm:
+                continue
+            others[name] = _instrument(other, other.setpoint)
+            if other.wanted is not None:
+                others[f"{name}, where it goes"] = _instrument(other, other.wanted)
+        return others
 
 
 def shown(status: ArmStatus, *, held: bool) -> str:
     """State as the arm publishes it: enabled arms that somebody holds are paused."""
     return "PAUSED" if held and status.state == "ENABLED" else status.state
+
+
+def _instrument(arm: _Arm, setpoint: Setpoint) -> Instrument:
+    tip = arm.kinematics.forward(setpoint.joints)
+    return arm.kinematics.instrument(setpoint.joints, tip)
 
 
 def _goal(arm: _Arm) -> Setpoint:

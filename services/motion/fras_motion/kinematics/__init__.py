@@ -3,6 +3,7 @@
 from .arm import ArmKinematics
 from .cell import BASES_IN_WORLD, HOME_TIPS_M
 from .errors import Unreachable
+from .instrument import Instrument
 from .inverse import Joints
 from .pose import Pose, Quaternion, Vector3, matrix, quaternion
 from .psm import JAW_LOWER_RAD, JAW_UPPER_RAD, JOINT_NAMES, JOINTS
@@ -15,6 +16,7 @@ __all__ = [
     "JOINTS",
     "JOINT_NAMES",
     "ArmKinematics",
+    "Instrument",
     "Joints",
     "Pose",
     "Quaternion",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from .instrument import Instrument
 from .inverse import Joints, inverse
 from .model import PsmModel
 from .pose import Matrix, Pose, Quaternion, Vector3, matrix, quaternion
@@ -51,6 +52,24 @@ class ArmKinematics:
         """
         position, rotation = self._model.forward(joints)
         return Pose(position, quaternion(rotation))
+
+    def instrument(self, joints: Joints, tip_in_world: Pose) -> Instrument:
+        """Where the instrument's axis runs.
+
+        Parameters
+        ----------
+        joints : tuple of float, length 6
+            Joint values [rad; m for the insertion].
+        tip_in_world : Pose
+            The tip that belongs to them, from `forward`.
+
+        Returns
+        -------
+        Instrument
+            Remote centre, wrist and tip in the world.
+        """
+        centre = self.base_in_world.position_m
+        return Instrument(centre, self._model.wrist(joints), tip_in_world.position_m)
 
     def jacobian(self, joints: Joints) -> Matrix:
         """Geometric Jacobian of the tip, see `PsmModel.jacobian`.

@@ -106,6 +106,23 @@ class PsmModel:
             pin.ReferenceFrame.LOCAL_WORLD_ALIGNED,
         ).copy()
 
+    def wrist(self, joints: Joints) -> Vector3:
+        """Where the shaft ends: the centre of the wrist.
+
+        Parameters
+        ----------
+        joints : tuple of float, length 6
+            Joint values [rad; m for the insertion].
+
+        Returns
+        -------
+        tuple of float, length 3
+            The origin of the wrist pitch joint's frame in the world [m].
+        """
+        pin.forwardKinematics(self._model, self._data, np.array(joints))
+        x, y, z = self._data.oMi[5].translation.tolist()
+        return (x, y, z)
+
     def joint_origins(self, joints: Joints) -> Matrix:
         """Origins of the joints' frames in the world, for the remote centre and the shaft.
 

@@ -6,76 +6,19 @@ setpoint again before it is sent.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from math import dist, inf, isfinite
 
 from fras_motion.drivers import Setpoint
-from fras_motion.kinematics import (
-    JAW_LOWER_RAD,
-    JAW_UPPER_RAD,
-    JOINTS,
-    Pose,
-    Quaternion,
-    Vector3,
-)
+from fras_motion.kinematics import JAW_LOWER_RAD, JAW_UPPER_RAD, JOINTS, Vector3
 
+from .clearance import forbidden_box, instrument_distance
 from .errors import GateRefused
+from .step import Bounds, Gate, Step
 
-__all__ = ["GATES", "Bounds", "Gate", "Step", "check_workspace", "joint_accelerations"]
+__all__ = ["GATES", "check_workspace", "joint_accelerations"]
 
 # A motion at its limit may exceed it by the rounding of the arithmetic.
 _ROUNDING = 1.0 + 1e-6
-
-
-@dataclass(frozen=True)
-class Bounds:
-    """What the gates hold steps against, beside the arm's own limits.
-
-    Parameters
-    ----------
-    workspace_lower_m, workspace_upper_m : tuple of float, length 3
-        Corners of the box the tips must stay in, world frame [m].
-    speed_m_s : float
-        Largest speed of a tip.
-    jaw_speed_rad_s : float
-        Largest speed of a jaw.
-    orientation_rad : float
-        Largest angle between a tip's orientation and the fixed one.
-    """
-
-    workspace_lower_m: Vector3
-    workspace_upper_m: Vector3
-    speed_m_s: float
-    jaw_speed_rad_s: float
-    orientation_rad: float = 1e-6
-
-
-@dataclass(frozen=True)
-class Step:
-    """One tick of one arm: from the last setpoint to the next.
-
-    Parameters
-    ----------
-    dt_s : float
-        Duration of the tick [s].
-    before, after : Setpoint
-        The two setpoints.
-    tip_before, tip_after : Pose
-        The tips that belong to them, by forward kinematics, in the world.
-    orientation_xyzw : tuple of float, length 4
-        The orientation the tip shall keep, in the world.
-    """
-
-    dt_s: float
-    before: Setpoint
-    after: Setpoint
-    tip_before: Pose
-    tip_after: Pose
-    orientation_xyzw: Quaternion
-
-
-Gate = Callable[[Step, Bounds], None]
 
 
 def finite(step: Step, bounds: Bounds) -> None:
@@ -251,6 +194,8 @@ GATES: dict[str, Gate] = {
     "workspace": workspace,
     "cartesian_speed": cartesian_speed,
     "orientation": orientation,
+    "instrument_distance": instrument_distance,
+    "forbidden_box": forbidden_box,
 }
 
 
