@@ -58,3 +58,14 @@ def test_only_the_last_ones_are_kept():
         gate.admit("a", message("t-2", seq))
     assert gate.dropped == 10
     assert [entry[1].seq for entry in gate.enter("t-2")] == list(range(10, HELD + 10))
+
+
+def test_each_drop_is_told_with_the_trial_that_is_served():
+    told = []
+    gate = TrialGate(lambda route, dropped, serves: told.append((route, dropped.trial, serves)))
+    gate.enter("t-1")
+    gate.admit("a", message("t-0"))
+    gate.admit("b", message("t-2"))
+    assert told == []  # both may yet begin
+    gate.enter("t-2")
+    assert told == [("a", "t-0", "t-2")]

@@ -50,6 +50,7 @@ def health(service: str) -> Health:
     return Health(
         service=service, state="ready", rss_bytes=1, cpu_percent=0.5, received=0, published=0,
         malformed=0, refused=0, wrong_trial=0, queue_depth=0, queue_dropped=0, gaps=0, facts={},
+        refusals={},
     )  # fmt: skip
 
 

@@ -2,35 +2,44 @@
 
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
 from fras_common.bus import RemoteFault
+from fras_common.codec import decode
 from fras_common.messages import (
     ActionResult,
     CancelReply,
     CancelRequest,
     ExecuteReply,
     ExecuteRequest,
+    FaultRecord,
+    Health,
     HoldRequest,
     HoldState,
     ResetRequest,
     ResumeRequest,
     RobotState,
+    RpcRecord,
     Verdict,
 )
 from fras_common.scenario import RunSection, Scenario, resolve
+from fras_common.service.health import ProcessMeter
 from fras_common.topics import (
     ACTION_RESULT,
     CANCEL,
     EXECUTE,
+    FAULT,
     HOLD,
     MOTION_RESET,
     RESUME,
     ROBOT_STATE,
+    RPC,
     VERDICT,
 )
+from fras_motion.safety import GATES
 from fras_motion.service import MotionService
 from support.shells import ShellBench
 
@@ -199,6 +208,7 @@ def test_patience_ends_and_says_who_was_waited_for(
     while not bench.results and time.monotonic() < deadline_s:
         bench.settle()
     assert (bench.results[-1].outcome, bench.results[-1].reason) == ("aborted", reason)
+    assert health(bench).refusals["hold_timeout" if held else "watchdog"] == 1
 
 
 def test_reset_with_impossible_numbers_is_a_typed_fault(bench: Bench) -> None:
@@ -280,3 +290,91 @@ def test_hold_that_no_tick_can_show_is_published_all_the_same(bench: Bench) -> N
     assert bench.host.facts["holds"] == "cli: wait"
     bench.answer(RESUME, ResumeRequest(holder="cli", by="cli"))
     assert bench.states[-1].holds == {}
+
+
+def health(bench: Bench) -> Health:
+    return bench.host.health(ProcessMeter())
+
+
+def test_refused_goal_is_on_the_bus_with_its_numbers_and_counted(bench: Bench) -> None:
+    bench.reset()
+    mirrors: list[RpcRecord] = bench.heard(RPC.of(service="motion", name="execute"))
+    reply = bench.reach(target_m=(0.5, 0.03, 0.005))
+    assert reply.reason == "workspace"
+    assert (reply.values["value"], reply.values["upper"]) == ("0.5", "0.11")
+    assert "x of the tip [m] would be 0.5" in reply.text
+    bench.settle()
+    assert decode(ExecuteReply, bytes(mirrors[-1].reply), "") == reply
+    bench.reach(target_m=(0.5, 0.03, 0.005))
+    bench.reach(trial="yesterday")
+    assert health(bench).refusals == {"another_trial": 1, "workspace": 2}
+
+
+@pytest.mark.parametrize("other", [0, 2, 7])
+def test_verdict_on_another_tick_is_refused_by_name_on_the_bus(bench: Bench, other: int) -> None:
+    faults: list[FaultRecord] = bench.heard(FAULT.of(service="motion"))
+    bench.reset()
+    bench.reach()
+    bench.judge(0)
+    before = bench.states[-1]
+    bench.judge(other)
+    assert bench.states[-1] == before
+    assert (faults[-1].key, faults[-1].kind, faults[-1].tick) == (
+        VERDICT.key,
+        "StaleVerdict",
+        other,
+    )
+    assert faults[-1].values == {"expected": "1", "got": str(other)}
+    assert health(bench).refusals == {"verdict_tick": 1}
+    bench.judge(1)
+    assert bench.states[-1].tick == 2
+
+
+def test_verdict_of_another_trial_is_refused_by_name_on_the_bus(bench: Bench) -> None:
+    faults: list[FaultRecord] = bench.heard(FAULT.of(service="motion"))
+    bench.reset()
+    bench.reach()
+    bench.judge(0, trial="yesterday")
+    assert len(bench.states) == 1
+    assert faults == []  # that trial might have been about to begin
+    bench.reset("t2")
+    assert (faults[-1].kind, faults[-1].trial) == ("AnotherTrial", "yesterday")
+    assert faults[-1].values == {"trial": "yesterday", "serves": "t2"}
+    assert health(bench).refusals == {"another_trial": 1}
+
+
+def test_gate_that_ends_an_action_puts_its_numbers_on_the_bus(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench.reset()
+    bench.reach()
+    for tick in range(20):
+        bench.judge(tick)
+    # The path was accepted under wider bounds than those in force now.
+    gate = GATES["cartesian_speed"]
+    monkeypatch.setitem(
+        GATES, "cartesian_speed", lambda step, bounds: gate(step, replace(bounds, speed_m_s=0.001))
+    )
+    bench.judge(20)
+    result = bench.results[-1]
+    assert (result.outcome, result.reason) == ("aborted", "gate:cartesian_speed")
+    assert (result.values["gate"], result.values["upper"]) == ("cartesian_speed", "0.001")
+    assert float(result.values["value"]) > 0.001
+    assert "speed of the tip [m/s] would be" in result.text
+    assert health(bench).refusals == {"cartesian_speed": 1}
+
+
+def test_what_stops_an_action_is_counted_by_name(bench: Bench) -> None:
+    bench.reset()
+    bench.reach()
+    for tick in range(20):
+        bench.judge(tick)
+    bench.judge(20, level="hard")
+    bench.judge_until_result()
+    assert bench.reach().reason == "hard_latch"
+    bench.reset("t2")
+    bench.reach(trial="t2")
+    bench.judge(0, trial="t2")
+    bench.answer(HOLD, HoldRequest(holder="cli", reason="wait"))
+    cancel(bench, "t2")
+    assert health(bench).refusals == {"cancel": 1, "force_hard": 1, "hard_latch": 1, "hold": 1}

@@ -19,6 +19,9 @@ class FrasError(Exception):
         for name, value in values.items():
             setattr(self, name, value)
 
+    #: Name under which health counts it where a message is refused with it; its kind if empty.
+    counted_as = ""
+
     @property
     def kind(self) -> str:
         """Name that travels with the error over the bus."""

@@ -1,6 +1,6 @@
 """Between messages and the motion controller."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import cast
 
@@ -93,7 +93,14 @@ def action_result(result: ActionResult, goal: Goal, trial: str) -> m.ActionResul
         block=goal.block or "",
         outcome=cast(ActionOutcome, result.outcome),
         reason=result.reason,
+        text=result.text,
+        values=in_words(result.values),
     )
+
+
+def in_words(values: Mapping[str, object]) -> dict[str, str]:
+    """Put the numbers behind a refusal on the wire."""
+    return {name: str(value) for name, value in values.items()}
 
 
 def _arm_state(arm: ArmState) -> m.ArmState:

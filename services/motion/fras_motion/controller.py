@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from itertools import product
-from math import isfinite
 
-from fras_motion.drivers import Driver, DriverFault, Measured
+from fras_common.errors import FrasError
+from fras_motion.drivers import Driver, DriverFault, Measured, Setpoint
 from fras_motion.kinematics import (
     BASES_IN_WORLD,
     HOME_TIPS_M,
@@ -16,7 +16,7 @@ from fras_motion.kinematics import (
     Pose,
     Unreachable,
 )
-from fras_motion.safety import GATES, Gate, GateRefused, Step, box_distance_m
+from fras_motion.safety import CHECKS, GATES, Gate, GateRefused, Situation, Step, box_distance_m
 from fras_motion.trajectory import ProfileImpossible
 
 from .course import Course, Ending, Progress
@@ -143,27 +143,10 @@ class MotionController:
         Refused
             With its reason; the arms stay where they are.
         """
-        if self._course is not None:
-            running = self._course.goal
-            raise Refused(
-                "busy",
-                f"{running.name} of {running.arm} (goal {running.goal_id}) runs; await its result",
-                goal_id=running.goal_id,
-            )
-        if goal.name not in PRIMITIVES:
-            known = ", ".join(PRIMITIVES)
-            raise Refused("unknown_action", f"{goal.name!r}; there are {known}", action=goal.name)
-        if goal.arm not in self.arms:
-            known = ", ".join(self.arms)
-            raise Refused("unknown_arm", f"{goal.arm!r}; there are {known}", arm=goal.arm)
-        if self._latched and goal.name != "release":
-            raise Refused(
-                "hard_latch",
-                f"the hard force limit was crossed: {goal.name} has to wait for a release",
-                action=goal.name,
-            )
-        if goal.target_m is not None and not all(isfinite(x) for x in goal.target_m):
-            raise Refused("not_finite", f"target {goal.target_m}", target_m=goal.target_m)
+        running = self._course.goal if self._course is not None else None
+        situation = Situation(running, PRIMITIVES, self.arms, self.hard_latched)
+        for check in CHECKS.values():
+            check(goal, situation)
         self._course = self._plan(goal)
         if self._holds:
             self._course.hold()
@@ -217,7 +200,23 @@ class MotionController:
             return None
         self._course = None
         self._last = replace(self._last, action=_action(course.goal, "interrupted"))
-        return ActionResult(course.goal.goal_id, "aborted", reason, self._last.tick)
+        return Ending("aborted", reason).result(course.goal, self._last.tick)
+
+    def expect(self, tick: int) -> None:
+        """Refuse a verdict that does not judge the present tick.
+
+        Parameters
+        ----------
+        tick : int
+            The tick it judges.
+
+        Raises
+        ------
+        StaleVerdict
+            Another one than that at which the arms stand.
+        """
+        if tick != self._last.tick:
+            raise StaleVerdict(self._last.tick, tick)
 
     def advance(self, verdict: Verdict) -> Advance:
         """Do one tick.
@@ -239,12 +238,11 @@ class MotionController:
         NoTickWanted
             No action runs, or it is held at rest.
         """
-        if verdict.tick != self._last.tick:
-            raise StaleVerdict(self._last.tick, verdict.tick)
+        self.expect(verdict.tick)
         course = self._course
         if course is None or not self.wants_tick:
             raise NoTickWanted(self._last.tick, tuple(sorted(self._holds)))
-        course.react(verdict)
+        reaction = course.react(verdict)
         if verdict.level == "hard" and course.goal.name != "release":
             holding = {name for name, arm in self._measured.items() if self._closed(arm)}
             self._latched |= holding or {course.goal.arm}
@@ -262,13 +260,12 @@ class MotionController:
         self._last = self._observe(tick, _action(course.goal, progress.phase), verdict.tick)
         result = None
         if progress.ending is not None:
-            result = ActionResult(
-                course.goal.goal_id, progress.ending.outcome, progress.ending.reason, tick
-            )
+            result = progress.ending.result(course.goal, tick)
             self._course = None
             if course.goal.name == "release" and result.outcome == "succeeded":
                 self._latched.discard(course.goal.arm)
-        return Advance(self.snapshot, result)
+        acted = tuple(name for name in (reaction, progress.refused_by) if name)
+        return Advance(self.snapshot, result, acted)
 
     def _plan(self, goal: Goal) -> Course:
         """Lay out an action and walk its whole path through the gates."""
@@ -320,9 +317,9 @@ class MotionController:
             for gate in self._gates.values():
                 gate(step, self._bounds)
         except GateRefused as fault:
-            return Progress(before, "interrupted", Ending("aborted", f"gate:{fault.gate}"))
-        except Unreachable:
-            return Progress(before, "interrupted", Ending("aborted", "gate:unreachable"))
+            return _refused(before, fault.gate, fault)
+        except Unreachable as fault:
+            return _refused(before, "unreachable", fault)
         self._setpoints[name], self._tips[name] = step.after, step.tip_after
         self._instruments[name] = step.instrument_after
         return progress
@@ -357,6 +354,12 @@ class MotionController:
             for name, measured in self._measured.items()
         }
         return Snapshot(tick, arms, action, {}, verdict_tick)
+
+
+def _refused(before: Setpoint, name: str, fault: FrasError) -> Progress:
+    """Stand where the arm stands, and say by name and numbers why."""
+    ending = Ending("aborted", f"gate:{name}", str(fault), fault.values)
+    return Progress(before, "interrupted", ending, name)
 
 
 def _action(goal: Goal, phase: str) -> ActionState:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Literal
 
 from fras_motion.drivers import Setpoint
@@ -10,7 +11,7 @@ from fras_motion.safety import Reaction, force_relieved, required_reaction
 from fras_motion.trajectory import brake, retreat
 
 from .parameters import MotionParameters
-from .states import Goal, Verdict
+from .states import ActionResult, Goal, Verdict
 from .strokes import Stroke
 
 __all__ = ["Course", "Ending", "Progress"]
@@ -24,12 +25,33 @@ class Ending:
 
     Parameters
     ----------
-    outcome, reason : str
+    outcome, reason, text, values
         See `ActionResult`.
     """
 
     outcome: str
     reason: str
+    text: str = ""
+    values: Mapping[str, object] = field(default_factory=dict[str, object])
+
+    def result(self, goal: Goal, tick: int) -> ActionResult:
+        """Make the result of the action that ended so.
+
+        Parameters
+        ----------
+        goal : Goal
+            What the action was.
+        tick : int
+            Its last tick.
+
+        Returns
+        -------
+        ActionResult
+            What to tell.
+        """
+        return ActionResult(
+            goal.goal_id, self.outcome, self.reason, tick, self.text, dict(self.values)
+        )
 
 
 @dataclass(frozen=True)
@@ -44,11 +66,14 @@ class Progress:
         What it does in this tick.
     ending : Ending or None
         How it ended, if this was its last tick.
+    refused_by : str
+        The gate that refused the setpoint which should have been sent instead; "" if none.
     """
 
     setpoint: Setpoint
     phase: str
     ending: Ending | None
+    refused_by: str = ""
 
 
 class Course:
@@ -96,20 +121,34 @@ class Course:
         """Stop, for a holder; a retreat stops too, and is not taken up again."""
         self._halt(Ending("interrupted", "hold"))
 
-    def react(self, verdict: Verdict) -> None:
+    def react(self, verdict: Verdict) -> str:
         """Stop, if the verdict asks for it.
 
         Parameters
         ----------
         verdict : Verdict
             On the present tick.
+
+        Returns
+        -------
+        str
+            The safeguard that changed how the action will end; "" if none did.
         """
+        expected = self._ending
+        self._heed(verdict)
+        if self._ending is expected:
+            return ""
+        known = verdict.level in ("soft", "hard")
+        return f"force_{verdict.level}" if known else "verdict_invalid"
+
+    def _heed(self, verdict: Verdict) -> None:
         reaction = required_reaction(verdict.level, self.goal.name)
         if reaction is Reaction.ABORT:
             aborted = Ending("aborted", f"hold:{verdict.reason or 'solver'}")
             if self._mode in ("run", "settle"):
                 self._halt(aborted)
-            self._ending = aborted
+            if self._ending != aborted:
+                self._ending = aborted
         elif reaction is Reaction.RETREAT and self._mode in ("run", "settle"):
             self._halt(Ending("interrupted", f"force_{verdict.level}"))
             self._retreats = bool(self._strokes) and self._strokes[self._index].can_retreat
@@ -118,7 +157,8 @@ class Course:
 
     def _outrank(self, graver: Ending) -> None:
         """Let a graver cause name the end that a stop under way will have."""
-        if self._ending is not None and self._ending.outcome == "interrupted":
+        ending = self._ending
+        if ending is not None and ending.outcome == "interrupted" and ending != graver:
             self._ending = graver
 
     def step(self, verdict: Verdict, before: Setpoint, held: bool) -> Progress:

@@ -39,8 +39,7 @@ class Refused(FrasError):
     Parameters
     ----------
     reason : str
-        Name of the reason (busy, unknown_action, unknown_arm, target_missing, not_finite,
-        jaw_open, jaw_closed, hard_latch, unreachable, or the name of a gate).
+        Name of the safeguard that refuses, see `fras_motion.safety.SAFEGUARDS`.
     text : str
         What was wrong and what to do about it.
     **values
@@ -64,6 +63,7 @@ class StaleVerdict(FrasError):
 
     expected: int
     got: int
+    counted_as = "verdict_tick"
 
     def __init__(self, expected: int, got: int) -> None:
         super().__init__(

@@ -24,6 +24,7 @@ from fras_motion.holds import Holds
 from fras_motion.pacing import Pacer
 from fras_motion.patience import Patience
 from fras_motion.peers import Peers
+from fras_motion.refusals import refusal
 from fras_motion.restoring import Restoring
 from fras_motion.states import ActionResult
 from fras_motion.trial import MotionTrial
@@ -68,7 +69,8 @@ class MotionService:
         scenario = request.scenario
         parameters = parameters_of(scenario)
         drivers = self._arms.drivers(parameters, scenario.run.pace)
-        trial = MotionTrial(request.trial, parameters, self._holds, drivers)
+        refusals = self._host.refusals
+        trial = MotionTrial(request.trial, parameters, self._holds, refusals, drivers)
         if self._trial is not None:
             self._finish(self._trial, self._trial.end("reset"))
         self._trial = trial
@@ -80,13 +82,12 @@ class MotionService:
         return m.ResetReply(digest=content_digest(request.trial, scenario, request.mesh))
 
     def _execute(self, request: m.ExecuteRequest) -> m.ExecuteReply:
-        if self._trial is None:
-            return m.ExecuteReply(accepted=False, reason="another_trial")
         try:
+            if self._trial is None:
+                raise Refused("another_trial", f"{request.trial!r}; none has begun: reset first")
             self._trial.execute(request.trial, goal_of(request))
         except Refused as error:
-            self._host.log.warning("goal refused", goal=request.goal_id, problem=str(error))
-            return m.ExecuteReply(accepted=False, reason=error.reason)
+            return refusal(self._host, request.goal_id, error)
         return m.ExecuteReply(accepted=True, reason="")
 
     def _begin_cancel(self, pending: Deferred[m.CancelRequest, m.CancelReply]) -> None:
@@ -114,6 +115,8 @@ class MotionService:
         return m.HoldState(holds=holds, tick=self._host.tick)
 
     def _on_verdict(self, verdict: m.Verdict) -> None:
+        if self._trial is not None:
+            self._trial.controller.expect(verdict.tick)
         self._verdict = verdict
 
     def wake(self) -> float | None:
@@ -141,7 +144,7 @@ class MotionService:
             self._patience.rest()
             if (wait_s := self._pacer.wait_s(now_s)) > 0.0:
                 return wait_s
-            advance = trial.controller.advance(verdict)
+            advance = trial.advance(verdict)
             self._pacer.ticked(now_s)
             self._publish(trial)
             self._finish(trial, advance.result)
@@ -156,7 +159,7 @@ class MotionService:
         reason = self._patience.exhausted(now_s, missing, self._holds)
         self._host.waiting_for = self._patience.waiting_for
         if reason:
-            self._finish(trial, trial.end(reason))
+            self._finish(trial, trial.end(reason, "watchdog" if missing else "hold_timeout"))
         elif self._host.waiting_for:
             # No verdict, no tick: the arms stand already.
             self._end_cancels(trial)

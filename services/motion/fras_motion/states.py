@@ -162,12 +162,18 @@ class ActionResult:
         Empty for success; nothing_in_reach, force_soft, force_hard, hold, hold:<who>, gate:<name>.
     tick : int
         Its last tick.
+    text : str
+        What a gate that ended it said; empty else.
+    values : mapping of str to object
+        The numbers behind the text.
     """
 
     goal_id: str
     outcome: str
     reason: str
     tick: int
+    text: str = ""
+    values: Mapping[str, object] = field(default_factory=dict[str, object])
 
 
 @dataclass(frozen=True)
@@ -180,7 +186,10 @@ class Advance:
         The robot after it.
     result : ActionResult or None
         The running action's result, if this tick ended it.
+    interventions : tuple of str
+        Safeguards that stopped or refused something in this tick.
     """
 
     snapshot: Snapshot
     result: ActionResult | None
+    interventions: tuple[str, ...] = ()

@@ -1,5 +1,6 @@
 """One trial's worth of motion: its goals, taken until it is cancelled, and what holds the arms."""
 
+from collections import Counter
 from collections.abc import Mapping
 from typing import Final
 
@@ -8,7 +9,7 @@ from fras_motion.drivers import Driver
 from fras_motion.errors import Refused
 from fras_motion.holds import Holds
 from fras_motion.parameters import MotionParameters
-from fras_motion.states import ActionResult, Goal, Verdict
+from fras_motion.states import ActionResult, Advance, Goal, Verdict
 
 CANCELLER: Final = "cancel"
 """Holder of motion's own hold, by which it brings a cancelled action to rest."""
@@ -24,6 +25,8 @@ class MotionTrial:
     parameters : MotionParameters
     holds : Holds
         What others hold; it outlives the trial.
+    refusals : Counter
+        Where what a safeguard refuses or stops is counted by its name.
     drivers : mapping of str to Driver, optional
         The robots; simulated ones by default.
     """
@@ -33,12 +36,14 @@ class MotionTrial:
         name: str,
         parameters: MotionParameters,
         holds: Holds,
+        refusals: Counter[str],
         drivers: Mapping[str, Driver] | None = None,
     ) -> None:
         self.name = name
         self.controller = MotionController(parameters, drivers=drivers)
         self.goal: Goal | None = None
         self._holds = holds
+        self._refusals = refusals
         self._open = True
         self.impose_holds()
 
@@ -65,6 +70,12 @@ class MotionTrial:
         self.controller.execute(goal)
         self.goal = goal
 
+    def advance(self, verdict: Verdict) -> Advance:
+        """Do one tick, and count what intervened in it."""
+        advance = self.controller.advance(verdict)
+        self._refusals.update(advance.interventions)
+        return advance
+
     def may_tick(self, verdict: Verdict | None) -> bool:
         """Whether a tick is wanted and its verdict is there."""
         return self.controller.wants_tick and verdict is not None and verdict.tick == self.tick
@@ -72,11 +83,14 @@ class MotionTrial:
     def cancel(self, reason: str) -> None:
         """Take no more goals, and bring the one under way to rest."""
         self._open = False
+        self._refusals["cancel"] += 1
         if self.goal is not None:
             self.controller.hold(CANCELLER, reason)
 
-    def end(self, reason: str) -> ActionResult | None:
-        """End the action under way at the tick where the arms stand."""
+    def end(self, reason: str, safeguard: str = "") -> ActionResult | None:
+        """End the action under way at the tick where the arms stand; count what ends it."""
+        if safeguard:
+            self._refusals[safeguard] += 1
         result = self.controller.abort(reason)
         self.controller.resume(CANCELLER)
         return result
@@ -91,6 +105,7 @@ class MotionTrial:
         }
         for holder, reason in wanted.items():
             if standing.get(holder) != reason:
+                self._refusals["hold"] += 1
                 self.controller.hold(holder, reason)
         for holder in standing.keys() - wanted.keys():
             self.controller.resume(holder)

@@ -304,7 +304,7 @@ def health() -> Health:
     return Health(
         service="sim", state="ready", rss_bytes=1, cpu_percent=1.0, received=1, published=1,
         malformed=0, refused=0, wrong_trial=0, queue_depth=0, queue_dropped=0, gaps=0,
-        facts={"linear_solver": "block tridiagonal"},
+        facts={"linear_solver": "block tridiagonal"}, refusals={},
     )  # fmt: skip
 
 

@@ -2,6 +2,8 @@
 
 from typing import Literal
 
+import msgspec
+
 from fras_common.messages.base import Header, Vec3, Wire, require_finite
 
 ActionOutcome = Literal["succeeded", "failed", "interrupted", "aborted"]
@@ -23,14 +25,34 @@ class ExecuteRequest(Wire, frozen=True, kw_only=True):
 
 
 class ExecuteReply(Wire, frozen=True, kw_only=True):
-    """Whether the goal was accepted, and if not, the named reason."""
+    """Whether the goal was accepted, and if not, the named reason.
+
+    Attributes
+    ----------
+    reason : str
+        Name of the safeguard that refused; empty else.
+    text : str
+        What it says, for people.
+    values : dict
+        The numbers and names behind the text.
+    """
 
     accepted: bool
     reason: str
+    text: str = ""
+    values: dict[str, str] = msgspec.field(default_factory=dict[str, str])
 
 
 class ActionResult(Header, frozen=True, kw_only=True):
-    """How an action ended."""
+    """How an action ended.
+
+    Attributes
+    ----------
+    text : str
+        What the gate said that ended it; empty else.
+    values : dict
+        The numbers and names behind the text.
+    """
 
     goal_id: str
     name: str
@@ -38,6 +60,8 @@ class ActionResult(Header, frozen=True, kw_only=True):
     block: str
     outcome: ActionOutcome
     reason: str
+    text: str = ""
+    values: dict[str, str] = msgspec.field(default_factory=dict[str, str])
 
 
 class CancelRequest(Wire, frozen=True, kw_only=True):

@@ -34,6 +34,9 @@ class Health(Header, frozen=True, kw_only=True):
     malformed, refused, wrong_trial, queue_dropped, gaps : int
         Messages refused by the codec, by the handler for what they say, of another trial, for
         lack of room, and sequence gaps.
+    refusals : dict
+        What was refused or stopped since the start, by the name of what did it: a safeguard of
+        motion (docs/reference/safety.md), else the type of the error.
     facts : dict
         What only this service can say, e.g. which linear solver it uses.
     """
@@ -51,6 +54,7 @@ class Health(Header, frozen=True, kw_only=True):
     queue_dropped: int
     gaps: int
     facts: dict[str, str]
+    refusals: dict[str, int] = msgspec.field(default_factory=dict[str, int])
 
 
 class LogRecord(Header, frozen=True, kw_only=True):

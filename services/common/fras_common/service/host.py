@@ -67,6 +67,17 @@ class Deferred(Generic[Req, Rep]):
         self._host.post(lambda: self._host.publish_mirror(self._query, record))
 
 
+class AnotherTrial(FrasError):
+    """A message of another trial than the one that is served."""
+
+    counted_as = "another_trial"
+
+    def __init__(self, trial: str, serves: str) -> None:
+        super().__init__(
+            f"of trial {trial!r}, and {serves!r} is served: dropped", trial=trial, serves=serves
+        )
+
+
 class InternalFault(FrasError):
     """A query met a mistake of our own; the server's log has the traceback."""
 
@@ -82,11 +93,12 @@ class ServiceHost:
 
     def __init__(self, name: str) -> None:
         self.name = name
-        self.gate = TrialGate()
+        self.gate = TrialGate(self._on_drop)
         self.log: structlog.stdlib.BoundLogger = structlog.get_logger(service=name)
         self.facts: dict[str, str] = {}
         self.waiting_for = ""
         self.counts: Counter[str] = Counter()
+        self.refusals: Counter[str] = Counter()
         self.tick = -1
         self._bus: Bus | None = None
         self._inbox: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
@@ -245,6 +257,7 @@ class ServiceHost:
             queue_dropped=self.counts["queue_dropped"],
             gaps=self.counts["gaps"],
             facts=dict(self.facts),
+            refusals=dict(sorted(self.refusals.items())),
         )
 
     def report_health(self, stop: threading.Event) -> None:
@@ -267,7 +280,7 @@ class ServiceHost:
         self._mirrors[query.mirror].put(record)
 
     def report_fault(self, key: str, error: FrasError, *, trial: str = "", tick: int = -1) -> None:
-        """Publish what was refused, with the numbers behind it.
+        """Publish what was refused, with the numbers behind it, and count it by name.
 
         Parameters
         ----------
@@ -278,6 +291,7 @@ class ServiceHost:
         trial, tick
             Of what was refused.
         """
+        self.refusals[error.counted_as or error.kind] += 1
         if self._faults is None:
             self._faults = self.publisher(FAULT.of(service=self.name))
         self._faults.put(
@@ -332,6 +346,10 @@ class ServiceHost:
             self.counts["refused"] += 1
             self.log.error("message refused", key=topic.key, problem=str(error))
             self.report_fault(topic.key, error, trial=message.trial, tick=message.tick)
+
+    def _on_drop(self, route: tuple[Topic[Any], Any], message: Header, serves: str) -> None:
+        error = AnotherTrial(message.trial, serves)
+        self.report_fault(route[0].key, error, trial=message.trial, tick=message.tick)
 
     def _on_token(self, token: str, present: bool) -> None:
         name, _, instance = token.rpartition("/")

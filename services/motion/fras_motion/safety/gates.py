@@ -11,11 +11,21 @@ from math import dist, inf, isfinite
 from fras_motion.drivers import Setpoint
 from fras_motion.kinematics import JAW_LOWER_RAD, JAW_UPPER_RAD, JOINTS, Vector3
 
-from .clearance import forbidden_box, instrument_distance
 from .errors import GateRefused
-from .step import Bounds, Gate, Step
+from .step import Bounds, Step
 
-__all__ = ["GATES", "check_workspace", "joint_accelerations"]
+__all__ = [
+    "cartesian_speed",
+    "check_workspace",
+    "finite",
+    "jaw_limits",
+    "jaw_speed",
+    "joint_accelerations",
+    "joint_limits",
+    "joint_speed",
+    "orientation",
+    "workspace",
+]
 
 # A motion at its limit may exceed it by the rounding of the arithmetic.
 _ROUNDING = 1.0 + 1e-6
@@ -184,21 +194,6 @@ def orientation(step: Step, bounds: Bounds) -> None:
         )
 
 
-#: Every gate, in the order in which they are asked.
-GATES: dict[str, Gate] = {
-    "finite": finite,
-    "joint_limits": joint_limits,
-    "joint_speed": joint_speed,
-    "jaw_limits": jaw_limits,
-    "jaw_speed": jaw_speed,
-    "workspace": workspace,
-    "cartesian_speed": cartesian_speed,
-    "orientation": orientation,
-    "instrument_distance": instrument_distance,
-    "forbidden_box": forbidden_box,
-}
-
-
 def check_workspace(tip_m: Vector3, bounds: Bounds) -> None:
     """Refuse a point outside of the box.
 
@@ -224,7 +219,7 @@ def check_workspace(tip_m: Vector3, bounds: Bounds) -> None:
 def joint_accelerations(first: Setpoint, second: Setpoint, third: Setpoint, dt_s: float) -> None:
     """Refuse a planned motion in which a joint accelerates more than it can.
 
-    A stop has its own limit (design, section 8), so this gate is for plans only and not among
+    A stop has its own limit (design, section 8), so this one is for plans only and not among
     `GATES`.
 
     Parameters
