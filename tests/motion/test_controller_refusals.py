@@ -81,6 +81,13 @@ def test_target_beyond_the_joints_is_refused_with_joint_and_bounds():
     assert (fault.values["lower"], fault.values["upper"]) == (0.0586, 0.24)
 
 
+def test_way_that_cannot_be_timed_is_refused():
+    controller = MotionController(MotionParameters(jerk_m_s3=1e-300))
+    fault = refusal(controller, REACH)
+    assert fault.reason == "profile"
+    assert fault.values["distance"] == pytest.approx(0.03)
+
+
 def test_path_that_fails_a_gate_half_way_is_refused_as_a_whole():
     def fence(step, bounds):
         del bounds
