@@ -34,3 +34,4 @@ class CommandRefused(FrasError):
             f"{arm}/{command} refused ({reason}): {text}",
             **{**values, "arm": arm, "command": command, "reason": reason},
         )
+        self.counted_as = reason
