@@ -13,8 +13,8 @@ from fras_common.codec import content_digest, decode
 from fras_common.messages import CloseReply, LastRequest, Verdict
 from fras_common.scenario import Scenario, to_toml
 from fras_common.topics import HEALTH, RECORDER_LAST
+from fras_log import LogFile
 from fras_recorder import service as recorder
-from fras_recorder.log_file import LogFile
 
 Stage = Any  # the fixture's class, in conftest.py, can't be imported from here
 

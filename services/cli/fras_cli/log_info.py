@@ -8,9 +8,9 @@ from rich.table import Table
 
 from fras_cli.display import OUTCOME_WORDS
 from fras_cli.report import read_trial, summarise
-from fras_cli.report.log_reader import LogReader
 from fras_common.codec import read_header
 from fras_common.topics import topic_of
+from fras_log.reader import LogReader
 
 
 @dataclass

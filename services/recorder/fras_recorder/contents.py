@@ -7,7 +7,7 @@ from platform import node, python_version
 from fras_common.errors import FrasError
 from fras_common.messages import OpenRequest
 from fras_common.scenario import to_toml
-from fras_recorder.log_file import LogFile
+from fras_log import LogFile
 
 LOG_NAME = "audit.mcap"
 

@@ -17,9 +17,9 @@ from fras_common.messages import (
 from fras_common.messages.recorder import LogState
 from fras_common.service import Deferred, ServiceHost
 from fras_common.topics import RECORDER_CLOSE, RECORDER_LAST, RECORDER_OPEN, RECORDER_STATUS
+from fras_log import LogFile
 from fras_recorder.completeness import Completeness
 from fras_recorder.contents import open_log
-from fras_recorder.log_file import LogFile
 
 FLUSH_S = 0.5
 QUIET_S = 0.05

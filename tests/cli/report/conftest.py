@@ -40,7 +40,7 @@ from fras_common.messages import (
 from fras_common.messages.motion import ActionOutcome
 from fras_common.scenario import Scenario, TissueSection, attachment_raster, resolve, to_toml
 from fras_common.scenario.geometry import nodes_in_discs
-from fras_recorder.log_file import LogFile
+from fras_log import LogFile
 
 TRIAL = "t-7"
 START_NS = 1_760_000_000_000_000_000

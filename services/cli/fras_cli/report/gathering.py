@@ -7,7 +7,6 @@ from typing import Any, TypeVar
 
 import msgspec
 
-from fras_cli.report.log_reader import RawMessage
 from fras_cli.report.trial import (
     RobotTick,
     ServiceFacts,
@@ -32,6 +31,7 @@ from fras_common.messages import (
     Verdict,
 )
 from fras_common.scenario import Scenario
+from fras_log.reader import RawMessage
 
 T = TypeVar("T")
 

@@ -3,12 +3,12 @@
 import tomllib
 from pathlib import Path
 
-from fras_cli.report.errors import ForeignLog
 from fras_cli.report.gathering import Gathering
-from fras_cli.report.log_reader import LogReader
 from fras_cli.report.trial import Trial
 from fras_common.scenario import Scenario
 from fras_common.scenario.loader import convert
+from fras_log.errors import ForeignLog
+from fras_log.reader import LogReader
 
 
 def read_trial(path: Path) -> Trial:

@@ -10,7 +10,7 @@ from mcap.exceptions import McapError
 from mcap.records import Channel, Footer, Header, McapRecord, Message, Metadata
 from mcap.stream_reader import CRCValidationError, StreamReader
 
-from fras_cli.report.errors import ForeignLog, NoSuchLog, NotAnMcap
+from fras_log.errors import ForeignLog, NoSuchLog, NotAnMcap
 
 PROFILE = "fras"
 METADATA = "fras"

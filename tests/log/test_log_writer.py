@@ -16,10 +16,10 @@ from mcap.records import Channel, Chunk, DataEnd, Message, Schema
 from mcap.stream_reader import StreamReader
 
 from fras_common.bus import RawSample
-from fras_common.codec import encode, json_schema
+from fras_common.codec import encode, json_schema, read_header
 from fras_common.messages import Header, LogRecord, RobotState
 from fras_common.topics import LOG
-from fras_recorder.log_file import LogExists, LogFile, read_header
+from fras_log import LogExists, LogFile
 
 ENCODING = "application/msgpack"
 Opened = Callable[..., LogFile]

@@ -13,17 +13,13 @@ from mcap.writer import CompressionType, Writer
 
 from fras_common.bus import RawSample
 from fras_common.codec import HeaderFields, json_schema, read_header
-from fras_common.errors import FrasError
 from fras_common.topics import topic_of
+from fras_log.errors import LogExists
 
 PROFILE = "fras"
 CHUNK_BYTES = 1024 * 1024
 # As many as a publisher's cache can send again.
 REMEMBERED = 2000
-
-
-class LogExists(FrasError):
-    """A log is never written over."""
 
 
 class Stream:

@@ -1,4 +1,4 @@
-"""What can be wrong with a log before there is anything to report on."""
+"""What can be wrong with a log before there is anything to read or write."""
 
 from pathlib import Path
 
@@ -36,3 +36,7 @@ class ForeignLog(FrasError):
             path=path,
             problem=problem,
         )
+
+
+class LogExists(FrasError):
+    """A log is never written over."""
