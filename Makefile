@@ -26,6 +26,7 @@ $(VENV)/.installed: $(SOURCES) | $(VENV)/bin/python
 	@echo "installing FRAS into $(VENV) (a minute or two)"
 	@$(PIP_INSTALL) --editable '.[all]'
 	@echo "compiling the finite-element kernels (once, about half a minute)"
+	@$(BIN)/python -m fras_log.keys
 	@$(BIN)/python -c 'from fras_sim.fem import compile_kernels; compile_kernels(everything=True)'
 	@touch $@
 

@@ -139,12 +139,12 @@ def test_a_missing_library_is_named_with_its_extra(capsys: pytest.CaptureFixture
 
 
 def test_a_folder_of_a_service_is_one_of_its_options(capsys: pytest.CaptureFixture[str]):
-    folders = {"own_rules": "rules of your own"}
-    options = parse_arguments("planner", ["--own-rules", "here"], "Plan.", folders)
+    paths = {"own_rules": "rules of your own"}
+    options = parse_arguments("planner", ["--own-rules", "here"], "Plan.", paths)
     assert options.own_rules == Path("here")
-    assert parse_arguments("planner", [], "Plan.", folders).own_rules is None
+    assert parse_arguments("planner", [], "Plan.", paths).own_rules is None
     with pytest.raises(SystemExit):
-        parse_arguments("planner", ["--help"], "Plan.", folders)
+        parse_arguments("planner", ["--help"], "Plan.", paths)
     assert "rules of your own" in capsys.readouterr().out
 
 

@@ -100,7 +100,9 @@ def test_the_file_says_what_it_is(path: Path, opened: Opened):
         reader = make_reader(stream, validate_crcs=True)
         assert reader.get_header().profile == "fras"
         records = {record.name: record.metadata for record in reader.iter_metadata()}
-        assert records == {"fras": {"trial": "t-1"}, "fras.closed": {"messages": "1"}}
+        assert set(records) == {"fras", "fras.chain", "fras.closed"}
+        assert records["fras"] == {"trial": "t-1"}
+        assert records["fras.closed"] == {"messages": "1", "head": file.head, "signature": ""}
         (attachment,) = reader.iter_attachments()
         assert (attachment.name, attachment.data) == ("scenario.toml", b"seed = 1")
         summary = reader.get_summary()

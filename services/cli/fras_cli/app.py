@@ -288,11 +288,45 @@ def log_verify(
     asp_dir: Annotated[
         Path | None, typer.Option(help="Specifications of your own, laid out like asp/.")
     ] = None,
+    key: Annotated[
+        list[Path] | None,
+        typer.Option(help="Public key to trust instead of this machine's; may be given again."),
+    ] = None,
+    head: Annotated[
+        str, typer.Option(help="Head of the chain, as noted when the log was closed.")
+    ] = "",
 ) -> None:
-    """Hold what a trial did against the safety specifications."""
+    """Tell whether a log is what was recorded, and its trial kept to the safety specifications."""
     from fras_cli.log_verify import verify_log
 
-    raise typer.Exit(verify_log(_log_file(log), asp_dir, _console()))
+    raise typer.Exit(verify_log(_log_file(log), asp_dir, _console(), keys=key or [], head=head))
+
+
+@log_app.command("recover")
+def log_recover(
+    log: Annotated[Path, typer.Argument(help="A damaged audit log, or a run's folder.")],
+    out: Annotated[
+        Path | None, typer.Option(help="File to write.", show_default="LOG.recovered.mcap")
+    ] = None,
+) -> None:
+    """Write what a damaged log still holds into a new one; the old one stays as it is."""
+    from fras_cli.log_recover import recover_log
+
+    raise typer.Exit(recover_log(_log_file(log), out, _console()))
+
+
+@log_app.command("show")
+def log_show(
+    log: Annotated[Path, typer.Argument(help="An audit log, or a run's folder.")],
+    key: Annotated[str, typer.Argument(help="One of the keys that `fras log info` lists.")],
+    json: Annotated[bool, typer.Option("--json", help="JSON, one message a line.")] = False,
+    first: Annotated[int | None, typer.Option("--from", help="First tick to show.")] = None,
+    last: Annotated[int | None, typer.Option("--to", help="Last tick to show.")] = None,
+) -> None:
+    """Show the messages of one key."""
+    from fras_cli.log_show import show_log
+
+    show_log(_log_file(log), key, Console(), as_json=json, first_tick=first, last_tick=last)
 
 
 @scenario_app.command("new")

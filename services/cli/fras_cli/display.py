@@ -128,6 +128,7 @@ def print_summary(console: Console, summary: Summary, places: Iterable[tuple[str
         ("time", f"{summary.sim_s:.1f} s simulated in {summary.wall_s:.1f} s"),
         ("a tick", f"{_duration(summary.tick_ms)}; finite elements {_duration(summary.fe_ms)}"),
         ("log", f"{summary.messages} messages, {summary.lost} lost"),
+        ("head", summary.head or "none: the log was never closed"),
         *places,
     ]
     for name, value in rows:

@@ -1,7 +1,8 @@
-"""`fras log verify`: what a trial did against the safety specifications, from its log alone."""
+"""`fras log verify`: whether a log is what was recorded, and what its trial did, from it alone."""
 
 import importlib
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 from rich.console import Console
@@ -13,20 +14,85 @@ from fras_common.errors import FrasError
 from fras_common.executed import history_step
 from fras_common.messages import Plan
 from fras_common.service.extras import require_extra
+from fras_log import Verification, verify_file
+from fras_log.keys import trusted_keys
 
 
 class LogIncomplete(FrasError):
     """A log that lacks what led to an action. Attributes: ``goal_id``."""
 
 
-def verify_log(path: Path, asp_dir: Path | None, console: Console) -> int:
-    """Print which specifications were broken; 0 if none was in a whole trial, else 1.
+def verify_log(
+    path: Path,
+    asp_dir: Path | None,
+    console: Console,
+    *,
+    keys: Sequence[Path] = (),
+    head: str = "",
+) -> int:
+    """Print what is wrong with a log and with what was done in it.
+
+    Parameters
+    ----------
+    path : Path
+    asp_dir : Path or None
+        Specifications other than those that came with FRAS.
+    console : Console
+    keys : sequence of Path
+        Public keys whose signatures are trusted; this machine's own by default.
+    head : str
+        Head of the chain that was noted when the log was closed.
+
+    Returns
+    -------
+    int
+        0 if the file is intact and all specifications were kept in a whole trial, else 1.
 
     Raises
     ------
+    NoSuchLog, NotAnMcap, ForeignLog, BadKey
+        There is nothing to verify, or nothing to verify it with.
     LogIncomplete
-        If the context or the plan behind an action is not in the log.
+        If the context or the plan behind an action is not in an intact log.
     """
+    found = verify_file(path, trusted_keys(keys), head.strip().lower())
+    _print_file(found, console)
+    try:
+        kept = _verify_trial(path, asp_dir, console)
+    except FrasError as error:
+        if found.intact:
+            raise
+        console.print(f"What was done can't be verified: {escape(str(error))}")
+        kept = False
+    return 0 if found.intact and kept else EXIT_NOT_SUCCESS
+
+
+def _print_file(found: Verification, console: Console) -> None:
+    for finding in found.findings:
+        console.print(escape(str(finding)), style="red", soft_wrap=True)
+    for kind, count in found.beyond.items():
+        console.print(f"{kind}: {count} more", style="red")
+    console.print(f"{found.messages} messages, head {found.head}", soft_wrap=True)
+    if found.authentic:
+        console.print(f"The log is authentic: intact, and signed with key {found.signed_by}.")
+    elif found.intact and found.signed_by:
+        console.print(
+            f"The log is intact. It is signed with key {found.signed_by}, which is not among those "
+            "trusted here: give that machine's public key with --key."
+        )
+    elif found.intact:
+        console.print("The log is intact. It is not signed, so nobody vouches for who wrote it.")
+    elif not found.findings:
+        console.print("The log was never closed; what is there is as it was recorded.")
+    else:
+        console.print(
+            f"The log is NOT what was recorded. Its chain vouches for the first {found.chained} "
+            "messages; `fras log recover` saves what is left."
+        )
+
+
+def _verify_trial(path: Path, asp_dir: Path | None, console: Console) -> bool:
+    """Hold what was done against the specifications; True if all were kept in a whole trial."""
     with require_extra("planner"):
         offline = importlib.import_module("fras_planner.offline")
     trial = read_trial(path)
@@ -46,7 +112,7 @@ def verify_log(path: Path, asp_dir: Path | None, console: Console) -> int:
     kept = "all specifications kept" if is_whole else "no specification broken by these"
     verdict = f"specifications broken: {len(broken)}" if broken else kept
     console.print(f"{len(history)} actions verified: {verdict}.")
-    return 0 if is_whole and list(said or []) == broken == [] else EXIT_NOT_SUCCESS
+    return is_whole and list(said or []) == broken == []
 
 
 def executed_history(trial: Trial) -> dict[int, list[str]]:

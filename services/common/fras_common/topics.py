@@ -270,10 +270,10 @@ SERVICES: tuple[str, ...] = ("sim", "sa", "planner", "motion", "recorder")
 
 def topic_of(key: str) -> Topic[Any] | None:
     """Find the table's row for a concrete key, or None for a key that is not in the table."""
-    for topic in TOPICS:
-        if topic.key == key:
-            return topic
-        head, brace, _ = topic.key.partition("{")
-        if brace and key.startswith(head):
-            return topic
-    return None
+    if (topic := _CONCRETE.get(key)) is not None:
+        return topic
+    return next((family for head, family in _FAMILIES if key.startswith(head)), None)
+
+
+_CONCRETE = {topic.key: topic for topic in TOPICS if "{" not in topic.key}
+_FAMILIES = tuple((topic.key.partition("{")[0], topic) for topic in TOPICS if "{" in topic.key)

@@ -1,15 +1,26 @@
 """The audit log as a file: written by the recorder, read by whoever looks into it."""
 
 from fras_log.errors import ForeignLog, LogExists, NoSuchLog, NotAnMcap
+from fras_log.keys import BadKey, PublicKey, Signer
 from fras_log.reader import LogReader, RawMessage
+from fras_log.recover import Recovery, recover_file
+from fras_log.verify import Finding, Verification, verify_file
 from fras_log.writer import LogFile
 
 __all__ = [
+    "BadKey",
+    "Finding",
     "ForeignLog",
     "LogExists",
     "LogFile",
     "LogReader",
     "NoSuchLog",
     "NotAnMcap",
+    "PublicKey",
     "RawMessage",
+    "Recovery",
+    "Signer",
+    "Verification",
+    "recover_file",
+    "verify_file",
 ]

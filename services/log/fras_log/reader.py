@@ -11,9 +11,7 @@ from mcap.records import Channel, Footer, Header, McapRecord, Message, Metadata
 from mcap.stream_reader import CRCValidationError, StreamReader
 
 from fras_log.errors import ForeignLog, NoSuchLog, NotAnMcap
-
-PROFILE = "fras"
-METADATA = "fras"
+from fras_log.names import CLOSED, METADATA, PROFILE
 
 # What the library raises where the bytes end or are damaged, depending on where that is.
 _DAMAGE = (McapError, CRCValidationError, UnicodeDecodeError, struct.error, zstandard.ZstdError)
@@ -41,6 +39,8 @@ class LogReader:
     ----------
     metadata : dict of str to str
         The recorder's record `fras`; filled while reading, it stands before any message.
+    closing : dict of str to str
+        The recorder's last record, `fras.closed`; empty where there is none.
     damage : str
         Why reading ended before the file's footer; empty when all of it was read.
     """
@@ -48,6 +48,7 @@ class LogReader:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.metadata: dict[str, str] = {}
+        self.closing: dict[str, str] = {}
         self.damage = "not read yet"
 
     def messages(self) -> Iterator[RawMessage]:
@@ -76,6 +77,8 @@ class LogReader:
                         keys[number] = topic
                     case Metadata(name=name, metadata=content) if name == METADATA:
                         self.metadata = dict(content)
+                    case Metadata(name=name, metadata=content) if name == CLOSED:
+                        self.closing = dict(content)
                     case Message(channel_id=number, data=data) if number in keys:
                         yield RawMessage(keys[number], data)
                     case Footer():

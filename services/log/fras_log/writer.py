@@ -5,8 +5,11 @@ publish time = producer's stamp, log time = arrival. Readable by any MCAP reader
 """
 
 import json
+import os
+import sys
 from collections import deque
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from mcap.writer import CompressionType, Writer
@@ -14,10 +17,21 @@ from mcap.writer import CompressionType, Writer
 from fras_common.bus import RawSample
 from fras_common.codec import HeaderFields, json_schema, read_header
 from fras_common.topics import topic_of
+from fras_log.chain import (
+    Chain,
+    Checkpoint,
+    closing_to_sign,
+    first_head,
+    leaf,
+    to_sign,
+)
 from fras_log.errors import LogExists
+from fras_log.keys import Signer
+from fras_log.names import CHECKPOINT, CLOSED, METADATA, PROFILE
 
-PROFILE = "fras"
 CHUNK_BYTES = 1024 * 1024
+_MOST_NS = 2**64 - 1
+_MOST_SEQUENCE = 2**32 - 1
 # As many as a publisher's cache can send again.
 REMEMBERED = 2000
 
@@ -59,6 +73,10 @@ class LogFile:
         Files that belong to the trial, e.g. the scenario.
     now_ns : int
         Wall clock for the attachments.
+    signer : Signer, optional
+        Signs the checkpoints of the chain.
+    fsync : bool
+        Whether a flush waits until the disk has it.
 
     Raises
     ------
@@ -72,6 +90,9 @@ class LogFile:
         metadata: Mapping[str, str],
         attachments: Mapping[str, bytes],
         now_ns: int,
+        signer: Signer | None = None,
+        *,
+        fsync: bool = False,
     ) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         try:
@@ -85,17 +106,25 @@ class LogFile:
         self.messages = 0
         self.lost = 0
         self._streams: dict[tuple[str, str], Stream] = {}
+        self._signer = signer
+        self._fsync = fsync
+        self._chunk_bytes = 0
+        opening = dict(metadata)
+        if signer is not None:
+            opening["public_key"] = signer.public.raw.hex()
+        self._chain = Chain(first_head(opening, attachments))
         self._channels: dict[str, int] = {}
         self._schemas: dict[str, int] = {}
         self._writer = Writer(
             self._stream,
-            chunk_size=CHUNK_BYTES,
+            # Chunks are closed by `flush` alone, each with its checkpoint.
+            chunk_size=sys.maxsize,
             compression=CompressionType.ZSTD,
             enable_crcs=True,
             enable_data_crcs=True,
         )
         self._writer.start(profile=PROFILE, library="fras_recorder")
-        self._writer.add_metadata("fras", dict(metadata))
+        self._writer.add_metadata(METADATA, opening)
         for name, data in attachments.items():
             self._writer.add_attachment(
                 create_time=now_ns,
@@ -117,31 +146,63 @@ class LogFile:
         header = read_header(sample.payload)
         if header is not None and self._is_copy(sample.key, header):
             return header
+        # The file has room for 64 and 32 bits without a sign; the message itself is verbatim.
+        stamp_ns = min(max(header.stamp_ns if header is not None else arrival_ns, 0), _MOST_NS)
+        sequence = (header.seq if header is not None else 0) & _MOST_SEQUENCE
         self._writer.add_message(
             channel_id=self._channel(sample),
             log_time=arrival_ns,
             data=sample.payload,
-            publish_time=header.stamp_ns if header is not None else arrival_ns,
-            sequence=header.seq if header is not None else 0,
+            publish_time=stamp_ns,
+            sequence=sequence,
         )
+        self._chain.add(leaf(sample.key, arrival_ns, stamp_ns, sequence, sample.payload))
         self.messages += 1
+        self._chunk_bytes += len(sample.payload)
+        if self._chunk_bytes >= CHUNK_BYTES:
+            self.flush()
         return header
 
     def flush(self) -> None:
-        """Close the chunk under way and hand it to the operating system.
-
-        The library closes chunks by size only; a quiet second would stay in memory.
-        """
+        """Close the chunk under way with its checkpoint, and hand both to the operating system."""
         self._writer.flush()
+        if self._chain.open:
+            self._writer.add_metadata(CHECKPOINT, self._checkpoint().as_metadata())
+        self._stream.flush()
+        if self._fsync:
+            os.fsync(self._stream.fileno())
+        self._chunk_bytes = 0
         self.bytes_written = self._stream.tell()
+
+    @property
+    def head(self) -> str:
+        """Head of the chain after the last message, hexadecimal."""
+        return self._chain.head.hex()
+
+    def add_metadata(self, name: str, content: Mapping[str, str]) -> None:
+        """Say something about the log, beside its messages."""
+        self._writer.add_metadata(name, dict(content))
 
     def close(self, summary: Mapping[str, str]) -> None:
         """Write the closing metadata and the index, and close the file."""
         self.flush()
-        self._writer.add_metadata("fras.closed", dict(summary))
+        closing = {**summary, "head": self.head, "messages": str(self.messages), "signature": ""}
+        if self._signer is not None:
+            closing["signature"] = self._signer.sign(closing_to_sign(closing)).hex()
+        self._writer.add_metadata(CLOSED, closing)
         self._writer.finish()
         self.bytes_written = self._stream.tell()
+        self._stream.flush()
+        if self._fsync:
+            os.fsync(self._stream.fileno())
         self._stream.close()
+
+    def _checkpoint(self) -> Checkpoint:
+        checkpoint = self._chain.checkpoint()
+        if self._signer is None:
+            return checkpoint
+        text = to_sign(checkpoint.messages, checkpoint.head)
+        return replace(checkpoint, signature=self._signer.sign(text))
 
     def abandon(self) -> None:
         """Let go of a file that can't be written any more; what was flushed stays readable."""

@@ -133,10 +133,11 @@ class SimulatedArms:
             name: replace(arm, operating_state=self.operating_state(name))
             for name, arm in trial.controller.snapshot.arms.items()
         }
-        if not self._face.publish(arms, busy, trial.tick, now_s):
-            return self._face.due_in_s(now_s)
-        self._said = moment
-        return self._face.heartbeat_in_s(now_s)
+        if self._face.publish(arms, busy, trial.tick, now_s):
+            self._said = moment
+            return self._face.heartbeat_in_s(now_s)
+        self._said = None
+        return self._face.due_in_s(now_s)
 
     def _tick(self, *, held: bool, now_s: float) -> float:
         if (wait_s := self._pacer.wait_s(now_s)) > 0.0:

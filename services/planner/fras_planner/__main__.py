@@ -15,7 +15,7 @@ def main(argv: list[str] | None = None) -> int:
         "fras_planner.service:PlannerService",
         argv,
         "Plan in Answer Set Programming, and act.",
-        {"asp_dir": "rules of your own, laid out like asp/"},
+        paths={"asp_dir": "rules of your own, laid out like asp/"},
     )
 
 

@@ -16,7 +16,12 @@ def main(argv: list[str] | None = None) -> int:
     from fras_common.service import run_service
 
     return run_service(
-        "recorder", "fras_recorder.service:RecorderService", argv, "Record all traffic to MCAP."
+        "recorder",
+        "fras_recorder.service:RecorderService",
+        argv,
+        "Record all traffic to MCAP.",
+        paths={"key": "private key that signs the logs (default: this machine's own)"},
+        choices={"sign": ("yes", "no")},
     )
 
 

@@ -7,7 +7,7 @@ from platform import node, python_version
 from fras_common.errors import FrasError
 from fras_common.messages import OpenRequest
 from fras_common.scenario import to_toml
-from fras_log import LogFile
+from fras_log import LogFile, Signer
 
 LOG_NAME = "audit.mcap"
 
@@ -16,7 +16,7 @@ class LogUnwritable(FrasError):
     """The folder named for a log can't take it."""
 
 
-def open_log(request: OpenRequest, now_ns: int) -> LogFile:
+def open_log(request: OpenRequest, now_ns: int, signer: Signer | None) -> LogFile:
     """Begin the log of a trial.
 
     Raises
@@ -29,7 +29,7 @@ def open_log(request: OpenRequest, now_ns: int) -> LogFile:
     path = Path(request.directory) / LOG_NAME
     metadata, attachments = _describe(request)
     try:
-        return LogFile(path, metadata, attachments, now_ns)
+        return LogFile(path, metadata, attachments, now_ns, signer)
     except OSError as error:
         raise LogUnwritable(f"cannot write {path}: {error}", path=path) from error
 

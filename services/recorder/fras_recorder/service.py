@@ -1,6 +1,7 @@
 """The recorder's shell: every sample of the cell into one MCAP file a trial."""
 
 import time
+from pathlib import Path
 
 from fras_common.bus import RawSample
 from fras_common.codec import content_digest
@@ -18,6 +19,7 @@ from fras_common.messages.recorder import LogState
 from fras_common.service import Deferred, ServiceHost
 from fras_common.topics import RECORDER_CLOSE, RECORDER_LAST, RECORDER_OPEN, RECORDER_STATUS
 from fras_log import LogFile
+from fras_log.keys import default_key_path, load_or_make
 from fras_recorder.completeness import Completeness
 from fras_recorder.contents import open_log
 
@@ -31,10 +33,26 @@ class NothingToClose(FrasError):
 
 
 class RecorderService:
-    """Writes what it hears; between trials it only listens."""
+    """Writes what it hears; between trials it only listens.
 
-    def __init__(self, host: ServiceHost) -> None:
+    Parameters
+    ----------
+    host : ServiceHost
+    key : Path, optional
+        Private key that signs the logs; this machine's own by default, made if there is none.
+    sign : str
+        `no` leaves them unsigned.
+
+    Raises
+    ------
+    BadKey
+        There is no key to be had.
+    """
+
+    def __init__(self, host: ServiceHost, key: Path | None = None, sign: str = "yes") -> None:
         self._host = host
+        self._signer = load_or_make(key or default_key_path()) if sign == "yes" else None
+        host.facts["signed_by"] = self._signer.public.fingerprint if self._signer else "nobody"
         self._file: LogFile | None = None
         self._seen = Completeness("")
         self._closing: Deferred[CloseRequest, CloseReply] | None = None
@@ -70,7 +88,7 @@ class RecorderService:
 
     def _open(self, request: OpenRequest) -> ResetReply:
         # The new one first: a folder that can't take it must not cost the log that is open.
-        file = open_log(request, time.time_ns())
+        file = open_log(request, time.time_ns(), self._signer)
         self._finish("superseded")
         self._file = file
         self._seen = Completeness(request.trial)

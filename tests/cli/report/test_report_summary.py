@@ -14,7 +14,8 @@ from fras_cli.report.summary import CUT_SHORT
 FIELDS = {
     "outcome", "reason", "seed", "scenario_kind", "visibility", "max_force_n", "limit_n",
     "ticks_above_limit", "plans", "replans", "actions", "violations", "ticks", "sim_s",
-    "wall_s", "startup_s", "tick_ms", "fe_ms", "messages", "lost", "log", "complete", "versions",
+    "wall_s", "startup_s", "tick_ms", "fe_ms", "messages", "lost", "log", "head", "complete",
+    "versions",
 }  # fmt: skip
 
 

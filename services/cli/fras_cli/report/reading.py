@@ -39,7 +39,7 @@ def read_trial(path: Path) -> Trial:
     return gathering.trial(
         path=str(path),
         damage=reader.damage,
-        metadata=reader.metadata,
+        metadata={**reader.metadata, "head": reader.closing.get("head", "")},
         scenario=_scenario_of(reader),
     )
 

@@ -47,6 +47,9 @@ class Summary(msgspec.Struct, frozen=True, kw_only=True):
         The finite-element step alone.
     messages, lost : int
         In the file, and missing in it by their numbering.
+    head : str
+        Of the log's hash chain, hexadecimal; empty where the log was never closed. Noted elsewhere,
+        it tells whether the log was changed since (`fras log verify --head`).
     complete : bool
         Whether the file is whole; else the numbers hold for what came before the cut.
     versions : dict of str to str
@@ -73,6 +76,7 @@ class Summary(msgspec.Struct, frozen=True, kw_only=True):
     messages: int
     lost: int
     log: str
+    head: str
     complete: bool
     versions: dict[str, str]
 
@@ -109,6 +113,7 @@ def summarise(trial: Trial) -> Summary:
         messages=trial.messages,
         lost=trial.lost,
         log=trial.path,
+        head=trial.metadata.get("head", ""),
         complete=trial.complete,
         versions=_versions(trial),
     )

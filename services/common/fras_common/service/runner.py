@@ -45,10 +45,10 @@ def parse_arguments(
     name: str,
     argv: list[str] | None,
     description: str,
-    folders: Mapping[str, str] | None = None,
+    paths: Mapping[str, str] | None = None,
     choices: Mapping[str, Sequence[str]] | None = None,
 ) -> argparse.Namespace:
-    """Arguments that every service takes, and the folders and choices that this one does."""
+    """Arguments that every service takes, and the paths and choices that this one does."""
     parser = argparse.ArgumentParser(prog=f"fras {name}", description=description)
     parser.add_argument("--cell", default="local", help="cell (Zenoh namespace fras/<cell>)")
     parser.add_argument(
@@ -58,9 +58,9 @@ def parse_arguments(
     parser.add_argument(
         "--log-level", default="INFO", choices=["DEBUG", "INFO", "WARNING", "ERROR"]
     )
-    for folder, help_text in (folders or {}).items():
-        flag = "--" + folder.replace("_", "-")
-        parser.add_argument(flag, dest=folder, type=Path, metavar="DIR", help=help_text)
+    for path, help_text in (paths or {}).items():
+        flag = "--" + path.replace("_", "-")
+        parser.add_argument(flag, dest=path, type=Path, metavar="PATH", help=help_text)
     for choice, allowed in (choices or {}).items():
         parser.add_argument(
             f"--{choice}", choices=allowed, default=allowed[0], help="(default: %(default)s)"
@@ -73,7 +73,7 @@ def run_service(
     shell: str,
     argv: list[str] | None = None,
     description: str = "",
-    folders: Mapping[str, str] | None = None,
+    paths: Mapping[str, str] | None = None,
     choices: Mapping[str, Sequence[str]] | None = None,
     extra: str = "",
 ) -> int:
@@ -90,8 +90,8 @@ def run_service(
         Command line without the program's name.
     description : str
         First line of `--help`.
-    folders : mapping of str to str, optional
-        Names of folders that the shell takes, as keywords, with their help.
+    paths : mapping of str to str, optional
+        Names of files and folders that the shell takes, as keywords, with their help.
     choices : mapping of str to sequence of str, optional
         Names of options that the shell takes, as keywords, with what they may be; the first is the
         default.
@@ -104,9 +104,9 @@ def run_service(
         Exit status: 0 after a stop, 3 if a library is missing, the router can't be reached or the
         shell can't be made of what it was given.
     """
-    folders, choices = folders or {}, choices or {}
-    options = parse_arguments(name, argv, description, folders, choices)
-    given = {option: getattr(options, option) for option in (*folders, *choices)}
+    paths, choices = paths or {}, choices or {}
+    options = parse_arguments(name, argv, description, paths, choices)
+    given = {option: getattr(options, option) for option in (*paths, *choices)}
     stop = StopFlag()
     stop.install()
     host = ServiceHost(name)

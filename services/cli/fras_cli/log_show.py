@@ -1,0 +1,113 @@
+"""`fras log show`: the messages of a key, readable or as JSON lines."""
+
+import base64
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, cast
+
+import msgpack
+from rich.console import Console
+from rich.markup import escape
+
+from fras_common.codec import read_header
+from fras_common.errors import FrasError
+from fras_log.scan import Broken, Recorded, scan
+
+MOST_ITEMS = 8
+MOST_BYTES = 16
+
+
+class NoSuchKey(FrasError):
+    """The log holds no message of that key. Attributes: ``key``."""
+
+
+def show_log(
+    path: Path,
+    key: str,
+    console: Console,
+    *,
+    as_json: bool,
+    first_tick: int | None,
+    last_tick: int | None,
+) -> None:
+    """Print the messages of a key.
+
+    Parameters
+    ----------
+    path : Path
+    key : str
+        Without the cell.
+    console : Console
+        For people; JSON goes to standard output.
+    as_json : bool
+        One object a line, all of it, bytes as base64 text.
+    first_tick, last_tick : int or None
+        Show only messages of these ticks, both included.
+
+    Raises
+    ------
+    NoSuchLog, NotAnMcap
+    NoSuchKey
+        Names the keys that there are.
+    """
+    keys: set[str] = set()
+    for event in scan(path):
+        if isinstance(event, Broken):
+            console.print(f"damaged at offset {event.offset}: {escape(event.text)}", style="red")
+        if not isinstance(event, Recorded):
+            continue
+        keys.add(event.topic)
+        if event.topic != key:
+            continue
+        content = _decode(event.payload)
+        header = read_header(event.payload)
+        tick = header.tick if header is not None else -1
+        if (first_tick is not None and tick < first_tick) or (
+            last_tick is not None and tick > last_tick
+        ):
+            continue
+        if as_json:
+            print(json.dumps(_plain(content)))
+        else:
+            console.print("\n".join(_lines(content)), markup=False, highlight=False)
+            console.print()
+    if key not in keys:
+        known = ", ".join(sorted(keys)) or "none at all"
+        raise NoSuchKey(f"{path} holds no message of {key!r}; its keys: {known}", key=key)
+
+
+def _decode(payload: bytes) -> Any:
+    """Decode MessagePack with no knowledge of its type; the library has no types either."""
+    return cast(Any, msgpack).unpackb(payload, strict_map_key=False)
+
+
+def _plain(value: Any) -> Any:
+    """Return a value as JSON has it."""
+    if isinstance(value, bytes):
+        return base64.b64encode(value).decode()
+    if isinstance(value, dict):
+        return {str(name): _plain(one) for name, one in cast(dict[Any, Any], value).items()}
+    if isinstance(value, list):
+        return [_plain(one) for one in cast(list[Any], value)]
+    return value
+
+
+def _lines(value: Any, name: str = "", depth: int = 0) -> Iterator[str]:
+    """Tell a value in lines; long lists and bytes by their beginning and size."""
+    margin = "  " * depth + (f"{name}: " if name else "")
+    if isinstance(value, dict) and value:
+        if name:
+            yield margin.rstrip()
+        for key, one in cast(dict[Any, Any], value).items():
+            yield from _lines(one, str(key), depth + bool(name))
+    elif isinstance(value, bytes):
+        more = "..." if len(value) > MOST_BYTES else ""
+        yield f"{margin}{len(value)} bytes {value[:MOST_BYTES].hex()}{more}"
+    elif isinstance(value, list):
+        items = cast(list[Any], value)
+        shown = ", ".join(str(_plain(one)) for one in items[:MOST_ITEMS])
+        more = f", ... ({len(items)} in all)" if len(items) > MOST_ITEMS else ""
+        yield f"{margin}[{shown}{more}]"
+    else:
+        yield f"{margin}{value}"

@@ -1,0 +1,155 @@
+"""Keys that sign logs: Ed25519, one a machine, made where there is none.
+
+`python -m fras_log.keys` makes this machine's key and prints its fingerprint.
+"""
+
+import hashlib
+import os
+import sys
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from cryptography.exceptions import InvalidSignature
+from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey, Ed25519PublicKey
+from cryptography.hazmat.primitives.serialization import (
+    Encoding,
+    NoEncryption,
+    PrivateFormat,
+    PublicFormat,
+    load_pem_private_key,
+    load_pem_public_key,
+)
+
+from fras_common.errors import FrasError
+
+PUBLIC_SUFFIX = ".pub"
+
+
+class BadKey(FrasError):
+    """A file that should hold a key and does not. Attributes: ``path``."""
+
+
+@dataclass(frozen=True)
+class PublicKey:
+    """One that a log may be signed with.
+
+    Parameters
+    ----------
+    raw : bytes
+        Its 32 bytes.
+    """
+
+    raw: bytes
+
+    @property
+    def fingerprint(self) -> str:
+        """Its name for people: the first 16 hexadecimal digits of its SHA-256."""
+        return hashlib.sha256(self.raw).hexdigest()[:16]
+
+    def has_signed(self, signature: bytes, text: bytes) -> bool:
+        """Whether a signature is this key's."""
+        try:
+            Ed25519PublicKey.from_public_bytes(self.raw).verify(signature, text)
+        except (InvalidSignature, ValueError):
+            return False
+        return True
+
+
+class Signer:
+    """A private key.
+
+    Parameters
+    ----------
+    key : Ed25519PrivateKey
+    """
+
+    def __init__(self, key: Ed25519PrivateKey) -> None:
+        self._key = key
+        self.public = PublicKey(key.public_key().public_bytes(Encoding.Raw, PublicFormat.Raw))
+
+    def sign(self, text: bytes) -> bytes:
+        """Sign; 64 bytes."""
+        return self._key.sign(text)
+
+
+def default_key_path() -> Path:
+    """Where this machine's key is: `$XDG_DATA_HOME/fras/log.key`, or below `~/.local/share`."""
+    base = os.environ.get("XDG_DATA_HOME")
+    return (Path(base) if base else Path.home() / ".local" / "share") / "fras" / "log.key"
+
+
+def load_or_make(path: Path) -> Signer:
+    """Read a private key, or make it, and its public half beside it, if there is no file.
+
+    Raises
+    ------
+    BadKey
+        The file is no key, or can't be read or made.
+    """
+    try:
+        if not path.exists():
+            _make(path)
+        key = load_pem_private_key(path.read_bytes(), password=None)
+    except (OSError, ValueError, TypeError) as error:
+        raise BadKey(f"{path}: no key to sign logs with: {error}", path=path) from error
+    if not isinstance(key, Ed25519PrivateKey):
+        raise BadKey(f"{path}: is no Ed25519 key", path=path)
+    return Signer(key)
+
+
+def _make(path: Path) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+    key = Ed25519PrivateKey.generate()
+    private = key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption())
+    # Complete or not there, and readable by its owner alone from the first byte on.
+    temporary = path.with_suffix(f".{os.getpid()}")
+    descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+    with os.fdopen(descriptor, "wb") as file:
+        file.write(private)
+    try:
+        # Unlike a rename this fails if another process was quicker; then its key is the one.
+        path.hardlink_to(temporary)
+    except FileExistsError:
+        return
+    finally:
+        temporary.unlink()
+    public = key.public_key().public_bytes(Encoding.PEM, PublicFormat.SubjectPublicKeyInfo)
+    path.with_suffix(PUBLIC_SUFFIX).write_bytes(public)
+
+
+def read_public(path: Path) -> PublicKey:
+    """Read a public key.
+
+    Raises
+    ------
+    BadKey
+        The file is none.
+    """
+    try:
+        key = load_pem_public_key(path.read_bytes())
+    except (OSError, ValueError) as error:
+        raise BadKey(f"{path}: no public key: {error}", path=path) from error
+    if not isinstance(key, Ed25519PublicKey):
+        raise BadKey(f"{path}: is no Ed25519 key", path=path)
+    return PublicKey(key.public_bytes(Encoding.Raw, PublicFormat.Raw))
+
+
+def trusted_keys(paths: Iterable[Path]) -> list[PublicKey]:
+    """Read the public keys given; without any, this machine's own if there is one.
+
+    Raises
+    ------
+    BadKey
+    """
+    given = list(paths)
+    if given:
+        return [read_public(path) for path in given]
+    own = default_key_path().with_suffix(PUBLIC_SUFFIX)
+    return [read_public(own)] if own.exists() else []
+
+
+if __name__ == "__main__":
+    made = load_or_make(default_key_path())
+    print(f"logs are signed with key {made.public.fingerprint}, {default_key_path()}")
+    sys.exit(0)

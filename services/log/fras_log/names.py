@@ -1,0 +1,12 @@
+"""How a log's own records are called."""
+
+PROFILE = "fras"
+"""Of the file: whose conventions it follows."""
+METADATA = "fras"
+"""What it says of itself, before its messages."""
+CHECKPOINT = "fras.chain"
+"""Where the chain stands, each second or so."""
+CLOSED = "fras.closed"
+"""How it was finished."""
+RECOVERED = "fras.recovered"
+"""What it was recovered from."""
