@@ -95,7 +95,8 @@ class CrtkFace:
         bool
             Whether it was said; else it was too early.
         """
-        heartbeat = now_s >= self._heartbeat_s
+        early = now_s < self._due_s
+        heartbeat = now_s >= self._heartbeat_s and not early
         for name, arm in arms.items():
             status = self._direct.status(name)
             state = (arm.operating_state, status.is_homed, busy.get(name, False))
@@ -104,7 +105,7 @@ class CrtkFace:
                 self._arms[name].say_state(state, tick)
         if heartbeat:
             self._heartbeat_s = now_s + HEARTBEAT_S
-        if not heartbeat and now_s < self._due_s:
+        if early:
             return False
         self._due_s = now_s + PERIOD_S
         for name, arm in arms.items():
@@ -113,7 +114,7 @@ class CrtkFace:
 
     def heartbeat_in_s(self, now_s: float) -> float:
         """Seconds until the arms must say again where they are."""
-        return max(0.0, self._heartbeat_s - now_s)
+        return max(0.0, self._heartbeat_s - now_s, self._due_s - now_s)
 
     def due_in_s(self, now_s: float) -> float:
         """Seconds until the arms may say again where they are."""
