@@ -10,7 +10,7 @@ from fras_common import messages as m
 from fras_common.errors import FrasError
 from fras_common.service import ServiceHost
 from fras_common.topics import CRTK
-from fras_motion.crtk import ArmStatus, CommandRefused, DirectControl, shown
+from fras_motion.crtk import ArmStatus, CommandRefused, DirectControl, shown, way_back
 from fras_motion.crtk.face import CrtkFace
 from fras_motion.crtk.link import CrtkLink
 from fras_motion.drivers import CrtkDriver, Driver
@@ -24,8 +24,12 @@ from fras_motion.trial import MotionTrial
 
 __all__ = ["ArmAccess", "PaceTooFast", "remote_arms", "simulated_arms"]
 
-# State commands that stop an arm; what leads back to ENABLED lifts their hold.
-_STATES_BEHIND = {"pause": "PAUSED", "disable": "DISABLED"}
+# State commands that stop an arm, and how it stands then: a hold, lifted by what lets it move again.
+_LEFT_BY = {
+    "pause": ArmStatus("PAUSED"),
+    "disable": ArmStatus("DISABLED"),
+    "unhome": ArmStatus(is_homed=False),
+}
 _FAULT = "fault"
 _IDLE_S = 60.0
 
@@ -104,10 +108,11 @@ class SimulatedArms:
         """Take over the states that `pause`, `disable` and faults left."""
         for arm in BASES_IN_WORLD:
             if (command := holds.get(_holder(arm))) is not None:
-                self._direct.restore(arm, _STATES_BEHIND.get(command, "FAULT"))
+                self._direct.restore(arm, _LEFT_BY.get(command, ArmStatus("FAULT")))
 
     def wake(self, trial: MotionTrial | None, now_s: float) -> float:
         """Say where the arms are; while no trial runs, follow who leads them."""
+        self._heed_lifted_holds()
         if self._trial is not None and not self._trial.runs:
             controller = self._trial.controller
             self._direct.take_over(controller.snapshot.arms, controller.drivers)
@@ -148,11 +153,21 @@ class SimulatedArms:
             self._host.report_fault(f"{refusal.arm}/{refusal.command}", refusal)
         return self._pacer.wait_s(now_s)
 
+    def _heed_lifted_holds(self) -> None:
+        """Let an arm move again whose hold a person lifted: none moves in another state."""
+        held = self._holds.current()
+        for arm in BASES_IN_WORLD:
+            if _holder(arm) not in held:
+                for command in way_back(self._direct.status(arm)):
+                    self._direct.state_command(arm, command)
+
     def _permit(self, arm: str, command: str) -> None:
         if self._trial is not None:
             text = f"trial {self._trial.name!r} leads the arms; wait for its end or abort it"
             raise CommandRefused(arm, command, "trial_runs", text, trial=self._trial.name)
-        if holds := self._holds.in_words():
+        # An arm that its own state stops says so itself.
+        holds = self._holds.in_words() if self._direct.status(arm).may_move else ""
+        if holds:
             text = f"the arms are held ({holds}); `fras resume` lifts a hold"
             raise CommandRefused(arm, command, "held", text)
 
@@ -162,9 +177,9 @@ class SimulatedArms:
             raise CommandRefused(arm, "state_command", "trial_runs", text, trial=self._trial.name)
         status = self._direct.state_command(arm, command)
         holder = _holder(arm)
-        if command in _STATES_BEHIND:
-            self._holds.hold(holder, command)
-        elif status.state == "ENABLED" and holder in self._holds.current():
+        if not status.may_move:
+            self._holds.hold(holder, command if command in _LEFT_BY else "unhome")
+        elif holder in self._holds.current():
             self._holds.resume(holder, by=holder)
         self._host.log.info("state", arm=arm, state=status.state, homed=status.is_homed)
 
@@ -177,6 +192,8 @@ class RemoteArms:
         self._link = CrtkLink(host)
         self._states: dict[str, str] = {}
         for keys in CRTK:
+            # Nothing moves an arm that has not said yet that it may be moved.
+            holds.hold(f"arms/{keys.arm}", "not heard of")
             host.subscribe(keys.operating_state, self._watch(keys.arm))
 
     def drivers(self, parameters: MotionParameters, pace: float) -> Mapping[str, Driver]:
@@ -205,8 +222,8 @@ class RemoteArms:
 
         def on_state(state: m.OperatingState) -> None:
             self._states[arm] = state.state
-            if state.state != "ENABLED" or not state.is_homed:
-                self._holds.hold(holder, state.state.lower() if state.is_homed else "not homed")
+            if not ArmStatus(state.state, state.is_homed).may_move:
+                self._holds.hold(holder, "not homed" if not state.is_homed else state.state.lower())
             elif holder in self._holds.current():
                 self._holds.resume(holder, by=holder)
 

@@ -2,6 +2,15 @@
 
 from .direct import DirectControl, shown
 from .errors import CommandRefused
-from .state_machine import COMMANDS, STATES, ArmStatus, follow
+from .state_machine import COMMANDS, STATES, ArmStatus, follow, way_back
 
-__all__ = ["COMMANDS", "STATES", "ArmStatus", "CommandRefused", "DirectControl", "follow", "shown"]
+__all__ = [
+    "COMMANDS",
+    "STATES",
+    "ArmStatus",
+    "CommandRefused",
+    "DirectControl",
+    "follow",
+    "shown",
+    "way_back",
+]

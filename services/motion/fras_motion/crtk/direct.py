@@ -117,10 +117,9 @@ class DirectControl:
         arm.status = follow(name, arm.status, command)
         return arm.status
 
-    def restore(self, name: str, state: str) -> None:
+    def restore(self, name: str, status: ArmStatus) -> None:
         """Put an arm's state machine where it stood before this process."""
-        arm = self._arms[name]
-        arm.status = replace(arm.status, state=state)
+        self._arms[name].status = status
 
     def servo_jp(self, name: str, joints: Joints) -> None:
         """Want the joints to be somewhere with the next tick.

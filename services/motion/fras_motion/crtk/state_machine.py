@@ -8,7 +8,7 @@ from typing import Final
 
 from .errors import CommandRefused
 
-__all__ = ["COMMANDS", "STATES", "ArmStatus", "follow"]
+__all__ = ["COMMANDS", "STATES", "ArmStatus", "follow", "way_back"]
 
 STATES: Final = ("DISABLED", "ENABLED", "PAUSED", "FAULT")
 
@@ -38,6 +38,11 @@ class ArmStatus:
 
     state: str = "ENABLED"
     is_homed: bool = True
+
+    @property
+    def may_move(self) -> bool:
+        """Whether the arm follows motion commands."""
+        return self.state == "ENABLED" and self.is_homed
 
 
 def follow(arm: str, status: ArmStatus, command: str) -> ArmStatus:
@@ -69,3 +74,15 @@ def follow(arm: str, status: ArmStatus, command: str) -> ArmStatus:
         )
     homed = {"home": True, "unhome": False}.get(command, status.is_homed)
     return replace(status, state=legal[status.state], is_homed=homed)
+
+
+def way_back(status: ArmStatus) -> tuple[str, ...]:
+    """Commands that let an arm move again; none if it may.
+
+    Parameters
+    ----------
+    status : ArmStatus
+        Where it stands.
+    """
+    enabling = {"ENABLED": (), "PAUSED": ("resume",)}.get(status.state, ("enable",))
+    return (*enabling, *(() if status.is_homed else ("home",)))
