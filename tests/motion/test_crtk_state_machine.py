@@ -2,7 +2,7 @@
 
 import pytest
 
-from fras_motion.crtk import COMMANDS, STATES, ArmStatus, CommandRefused, follow
+from fras_motion.crtk import COMMANDS, STATES, ArmStatus, CommandRefused, follow, way_back
 
 # psm.md: enable is invalid from PAUSED, disable is legal from any state; homing moves nothing.
 LEGAL = {
@@ -43,3 +43,15 @@ def test_homing_is_told_and_forgotten() -> None:
     assert not unhomed.is_homed
     assert not follow("psm1", unhomed, "pause").is_homed
     assert follow("psm1", unhomed, "home") == ArmStatus()
+
+
+@pytest.mark.parametrize("state", STATES)
+@pytest.mark.parametrize("is_homed", [True, False])
+def test_the_way_back_is_legal_and_leads_to_an_arm_that_may_move(
+    state: str, is_homed: bool
+) -> None:
+    status = ArmStatus(state, is_homed)
+    assert bool(way_back(status)) != status.may_move
+    for command in way_back(status):
+        status = follow("psm1", status, command)
+    assert status.may_move

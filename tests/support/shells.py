@@ -26,8 +26,11 @@ class ShellBench:
     def __init__(self, name: str, build: Callable[[ServiceHost], Service], client: str) -> None:
         fabric = MemoryFabric()
         self.client = MemoryBus(fabric, "cell", client)
+        self.fabric = fabric
         self.host = ServiceHost(name)
-        self.host.attach(MemoryBus(fabric, "cell", f"{name}/test"))
+        self.host.attach(
+            MemoryBus(fabric, "cell", f"{name}/test", on_malformed=self.host.count_malformed)
+        )
         self.service = build(self.host)
 
     def heard(self, topic: Any) -> list[Any]:

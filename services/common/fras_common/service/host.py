@@ -21,7 +21,7 @@ from fras_common.messages import Fault, FaultRecord, Header, Health, LogRecord, 
 from fras_common.messages.service import NIL
 from fras_common.service.gate import TrialGate
 from fras_common.service.health import ProcessMeter
-from fras_common.topics import FAULT, HEALTH, LOG, RPC, Query, Topic
+from fras_common.topics import FAULT, HEALTH, LOG, RPC, Qos, Query, Topic, topic_of
 
 M = TypeVar("M", bound=Header)
 Req = TypeVar("Req")
@@ -308,9 +308,17 @@ class ServiceHost:
     def count_malformed(self, error: MalformedMessage) -> None:
         """Count and log a payload that did not fit its key; the bus calls it."""
         self.counts["malformed"] += 1
-        self.post(lambda: self.log.warning("malformed message dropped", problem=str(error)))
+        self.post(lambda: self._tell_malformed(error))
 
     # --- inside ---------------------------------------------------------------------------
+
+    def _tell_malformed(self, error: MalformedMessage) -> None:
+        self.log.warning("malformed message dropped", problem=str(error))
+        key = str(error.values["key"])
+        topic = topic_of(key)
+        if topic is not None and topic.qos is Qos.COMMAND:
+            # Whoever leads an arm learns why it does not follow, whatever was wrong.
+            self.report_fault(key, error)
 
     def _answer(self, handler: Callable[[Any], Any], pending: Deferred[Any, Any]) -> None:
         try:
