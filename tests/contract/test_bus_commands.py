@@ -1,4 +1,4 @@
-"""Commands to an arm: all of them and in order for whoever listens, none for whoever comes later."""
+"""Commands to an arm: all and in order for whoever listens, none for who comes later."""
 
 from collections.abc import Callable
 from typing import Any
