@@ -1,0 +1,218 @@
+"""The arms in a process of their own, under the keys of CRTK; and clients that lead them."""
+
+import os
+import signal
+import time
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from math import dist
+from pathlib import Path
+from typing import Any
+
+import psutil
+import pytest
+
+from fras_cli.options import build_trial
+from fras_cli.report import Summary, write_report
+from fras_cli.stack import Layout, UsedStack, own_stack
+from fras_cli.trial import TrialFollower, TrialView
+from fras_common.messages import HoldRequest, Pose, ResumeRequest, RobotState, ServoJoints
+from fras_common.topics import CRTK, HOLD, RESUME
+from support.arms import KINEMATICS, off
+from support.leader import Leader
+from support.logs import assert_same_trial, messages
+
+MESH = "11,13,2"
+AT_ONCE_S = 0.5
+
+
+class ArmsStack:
+    """A stack whose arms are a process of their own, and one who leads them between trials."""
+
+    def __init__(self, stack: UsedStack, folder: Path) -> None:
+        # That the arms have gone is what the trial shall say, not the command line.
+        self._follower = TrialFollower(replace(stack, watch=lambda: ""))
+        self._folder = folder
+        self._count = 0
+        self.bus = stack.link.bus
+        self.leader = Leader(self.bus, "arms")
+        mine = {"fras_motion.arms_main", stack.link.connect}
+        children = psutil.Process().children()
+        (self.arms,) = [one for one in children if mine <= set(one.cmdline())]
+
+    def start(self) -> None:
+        """Bring the arms home, and begin a trial in real time."""
+        self.leader.bring_home()
+        self.leader.faults.clear()
+        self._count += 1
+        trial = build_trial("a", pace=1, mesh=MESH)
+        self._follower.start(f"trial-{self._count}", trial.scenario, self._out)
+
+    def follow(self, until: Any = lambda view: False) -> TrialView:
+        """Follow the trial to its end, or until something is seen."""
+        views: list[TrialView] = []
+        self._follower.follow(views.append, stop=lambda: bool(until(views[-1])))
+        return views[-1]
+
+    def abort(self) -> None:
+        """End the trial."""
+        self._follower.abort("seen enough")
+        self.follow()
+
+    def report(self) -> tuple[Summary, Path]:
+        """Read the log of the last trial."""
+        return write_report(self._out / "audit.mcap", self._out), self._out / "audit.mcap"
+
+    @property
+    def _out(self) -> Path:
+        return self._folder / f"trial-{self._count}"
+
+
+@contextmanager
+def arms_stack(folder: Path) -> Generator[ArmsStack]:
+    with own_stack("crtk-tests", None, folder / "logs", layout=Layout("crtk")) as stack:
+        yield ArmsStack(stack, folder)
+
+
+@pytest.fixture(scope="module")
+def with_arms(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ArmsStack]:
+    with arms_stack(tmp_path_factory.mktemp("crtk")) as stack:
+        yield stack
+
+
+def moves(view: TrialView) -> bool:
+    """Whether an arm is under way in mid-action."""
+    robot = view.robot
+    return robot is not None and robot.tick > 20 and robot.action is not None
+
+
+def result_of(log: Path) -> tuple[str, str]:
+    last = messages(log, "motion/action_result")[-1]
+    return last.outcome, last.reason
+
+
+def test_arms_that_freeze_end_the_trial_and_a_stop_is_still_answered(with_arms: ArmsStack) -> None:
+    with_arms.start()
+    with_arms.follow(moves)
+    os.kill(with_arms.arms.pid, signal.SIGSTOP)
+    try:
+        for number in range(10):
+            since_s = time.monotonic()
+            request = HoldRequest(holder="cli", reason=f"stop {number}")
+            assert with_arms.bus.query(HOLD, request, 5.0).holds["cli"] == f"stop {number}"
+            assert time.monotonic() - since_s < AT_ONCE_S
+        with_arms.follow()
+    finally:
+        os.kill(with_arms.arms.pid, signal.SIGCONT)
+        with_arms.bus.query(RESUME, ResumeRequest(holder="cli", by="cli"), 5.0)
+    summary, log = with_arms.report()
+    assert (summary.outcome, summary.reason) == ("aborted", "hold:arms")
+    assert summary.complete
+    assert result_of(log) == ("aborted", "hold:arms")
+
+
+def test_an_arm_that_somebody_disables_stops_and_motion_holds(with_arms: ArmsStack) -> None:
+    with_arms.start()
+    view = with_arms.follow(moves)
+    assert view.robot is not None
+    assert view.robot.action is not None
+    arm = view.robot.action.arm
+    with_arms.leader.state_command(arm, "disable")
+    ticks: list[int] = []
+
+    def stands_held(view: TrialView) -> bool:
+        robot = view.robot
+        if robot is not None and robot.action is not None and robot.action.phase == "held":
+            ticks.append(robot.tick)
+        return len(ticks) >= 3
+
+    held = with_arms.follow(stands_held).robot
+    assert held is not None
+    assert held.holds == {f"arms/{arm}": "disabled"}
+    assert held.arms[arm].operating_state == "DISABLED"
+    assert len(set(ticks)) == 1  # logical time stands still
+    leader = with_arms.leader
+    leader.until(lambda: max(map(abs, leader.joints(arm).joint_velocities)) < 1e-6)
+    stands = leader.joints(arm)
+    leader.until(lambda: leader.joints(arm).seq > stands.seq + 20)
+    assert leader.joints(arm).joints == pytest.approx(stands.joints, abs=1e-9)
+    with_arms.abort()
+    summary, _ = with_arms.report()
+    assert (summary.outcome, summary.reason) == ("aborted", "seen enough")
+
+
+def test_a_trial_with_arms_of_another_process_succeeds(with_arms: ArmsStack) -> None:
+    with_arms.start()
+    with_arms.follow()
+    summary, log = with_arms.report()
+    assert (summary.outcome, summary.lost) == ("success", 0)
+    assert summary.complete
+    assert with_arms.leader.faults == []
+    for keys in CRTK:
+        for topic in keys.all:
+            said = {message.source.partition("/")[0] for message in messages(log, topic.key)}
+            if topic.producer == "arms":
+                assert said == {"arms"}, topic.key
+        for topic in (keys.servo_jp, keys.jaw_servo_jp):
+            assert {m.source.partition("/")[0] for m in messages(log, topic.key)} == {"motion"}
+    states: list[RobotState] = messages(log, "robot/state")
+    told = messages(log, CRTK[0].servo_jp.key)
+    assert len(told) == len({state.tick for state in states}) - 1  # one a tick, none at tick 0
+
+
+def test_arms_that_die_end_the_trial_and_the_log_is_readable(tmp_path: Path) -> None:
+    with arms_stack(tmp_path) as stack:
+        stack.start()
+        stack.follow(moves)
+        stack.arms.kill()
+        stack.follow()
+        summary, log = stack.report()
+    assert (summary.outcome, summary.reason) == ("aborted", "hold:arms")
+    assert summary.complete
+    assert result_of(log) == ("aborted", "hold:arms")
+    assert len(messages(log, "robot/state")) > 20
+
+
+def test_a_client_leads_a_simulated_arm_between_trials_and_not_in_one(trials: Any) -> None:
+    leader = Leader(trials.stack.link.bus, "motion")
+    start = leader.joints("psm1")
+    there = Pose(position_m=(0.04, 0.02, 0.05), quaternion_xyzw=KINEMATICS["psm1"].tool_down_xyzw)
+    assert leader.off_by_m("psm1", there) > 0.005
+    leader.move("psm1", there)
+    assert dist(leader.joints("psm1").joints, start.joints) > 0.01
+    assert leader.faults == []
+    quiet = trials.run("a", mesh=MESH)[1]
+
+    def meddle(view: TrialView) -> None:
+        if view.task is not None and view.task.phase == "acting" and view.robot is not None:
+            joints: Any = off(view.robot.arms["psm1"].joints, 0, 0.001)
+            leader.tell(CRTK[0].servo_jp, ServoJoints(joints=joints))
+
+    disturbed = trials.run("a", meddle, mesh=MESH)[1]
+    refusals = messages(disturbed, "fault/motion")
+    assert len(refusals) > 3
+    assert {(fault.key, fault.values["reason"]) for fault in refusals} == {
+        ("psm1/servo_jp", "trial_runs")
+    }
+    assert set(leader.reasons()) == {("psm1/servo_jp", "trial_runs")}
+    assert_same_trial(quiet, disturbed)
+
+
+def test_a_trial_with_late_and_noisy_arms_succeeds_and_is_the_same_each_time(
+    trials: Any, tmp_path: Path
+) -> None:
+    scenario = tmp_path / "noisy.toml"
+    scenario.write_text(
+        "seed = 2\n[motion]\njoint_delay_s = 0.03\njoint_noise_rad = 0.0001\n"
+        "insertion_noise_m = 0.00002\n"
+    )
+    (first, one), (second, other) = (trials.run(str(scenario), mesh=MESH) for _ in range(2))
+    assert (first.outcome, second.outcome) == ("success", "success")
+    assert_same_trial(one, other)
+    states: list[RobotState] = messages(one, "robot/state")
+    errors = [
+        abs(state.arms["psm1"].joints[0] - state.arms["psm1"].setpoint_joints[0])
+        for state in states
+    ]
+    assert 1e-5 < sorted(errors)[len(errors) // 2] < 1e-3
