@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 import time
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager
@@ -197,6 +199,29 @@ def test_a_client_leads_a_simulated_arm_between_trials_and_not_in_one(trials: An
     }
     assert set(leader.reasons()) == {("psm1/servo_jp", "trial_runs")}
     assert_same_trial(quiet, disturbed)
+
+
+def test_the_client_of_the_reference_page_leads_an_arm_with_zenoh_and_msgpack_alone(
+    trials: Any, tmp_path: Path
+) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "reference" / "crtk.md").read_text()
+    link = trials.stack.link
+    for written, here in (
+        ("tcp/127.0.0.1:7447", link.connect),
+        ("fras/local", f"fras/{link.cell}"),
+    ):
+        assert written in page
+        page = page.replace(written, here)
+    (tmp_path / "lead.py").write_text(page.split("```python\n")[1].split("```")[0])
+
+    def lead(*place: str) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, str(tmp_path / "lead.py"), *place]
+        return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+
+    assert lead("0.05", "0.03", "0.055").stdout == "psm1 is at [0.05, 0.03, 0.055]\n"
+    refused = lead("0.05", "0.03", "0.9")
+    assert refused.returncode == 1
+    assert "psm1/move_cp refused (unreachable)" in refused.stderr
 
 
 def test_a_trial_with_late_and_noisy_arms_succeeds_and_is_the_same_each_time(
