@@ -179,15 +179,33 @@ def test_a_stopped_arm_refuses_to_move_by_its_state(leader: Leader, command: Any
     assert len(leader.faults) == 1
 
 
-def test_what_is_not_a_number_is_refused_from_the_wire_too(leader: Leader) -> None:
-    # Who builds messages with our types can't send it; a stranger can.
-    class Anything(Header, frozen=True, kw_only=True):
-        joints: tuple[float, ...]
+class Joints(Header, frozen=True, kw_only=True):
+    """What a stranger sends: our own types don't let it be made."""
 
-    bare: Topic[Any] = Topic(PSM1.servo_jp.key, Anything, "client", Qos.COMMAND, "never")
-    leader.tell(bare, Anything(joints=off(HOME["psm1"].joints, 3, nan)))
-    assert leader.reasons() == [(PSM1.servo_jp.key, "MalformedMessage", "")]
-    assert "joints is not finite" in leader.faults[0].text
+    joints: tuple[float, ...]
+
+
+class Command(Header, frozen=True, kw_only=True):
+    """Another one."""
+
+    command: str
+
+
+@pytest.mark.parametrize(
+    ("topic", "message", "problem"),
+    [
+        (PSM1.servo_jp, Joints(joints=off(HOME["psm1"].joints, 3, nan)), "joints is not finite"),
+        (PSM1.servo_jp, Joints(joints=HOME["psm1"].joints[:5]), "$.joints"),
+        (PSM1.state_command, Command(command="explode"), "$.command"),
+        (PSM1.move_cp, Joints(joints=()), "joints"),
+    ],
+)
+def test_what_is_no_command_is_refused_by_key_and_field(
+    leader: Leader, topic: Topic[Any], message: Header, problem: str
+) -> None:
+    leader.tell(Topic(topic.key, type(message), "client", Qos.COMMAND, "never"), message)
+    assert leader.reasons() == [(topic.key, "MalformedMessage", "")]
+    assert problem in leader.faults[0].text
     assert leader.host.counts["malformed"] == 1
     leader.turn_until(lambda: len(leader.joints) > 2)
     assert leader.joints[-1].joints == HOME["psm1"].joints
