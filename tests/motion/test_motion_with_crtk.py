@@ -14,6 +14,7 @@ from fras_common.messages import (
     HoldState,
     JawState,
     JointState,
+    LastReply,
     OperatingState,
     ResetRequest,
     ResumeRequest,
@@ -31,6 +32,7 @@ from fras_common.topics import (
     EXECUTE,
     HOLD,
     MOTION_RESET,
+    RECORDER_LAST,
     RESUME,
     ROBOT_STATE,
     VERDICT,
@@ -173,9 +175,10 @@ def bench(monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
     made.close()
 
 
-def test_it_is_ready_when_sim_sa_and_the_arms_are_alive(bench: Bench) -> None:
+def test_it_is_ready_when_its_peers_and_the_arms_are_alive(bench: Bench) -> None:
+    bench.client.serve(RECORDER_LAST, lambda call: call.reply(LastReply(payload=b"")))
     bench.host.announce_alive()
-    for service in ("sim", "sa"):
+    for service in ("sim", "sa", "recorder"):
         bench.client.announce(f"alive/{service}")
     bench.settle()
     assert bench.host.state == "starting"

@@ -24,7 +24,7 @@ from fras_motion.trial import MotionTrial
 
 __all__ = ["ArmAccess", "PaceTooFast", "remote_arms", "simulated_arms"]
 
-# State commands that stop an arm, and how it stands then: a hold, lifted by what lets it move again.
+# State commands that stop an arm, and how it stands then: a hold, lifted by what lets it move.
 _LEFT_BY = {
     "pause": ArmStatus("PAUSED"),
     "disable": ArmStatus("DISABLED"),
