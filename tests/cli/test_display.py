@@ -2,6 +2,7 @@
 
 import io
 
+import msgspec
 from rich.console import Console
 
 from fras_cli.display import LiveDisplay, action_line, bar, render
@@ -51,6 +52,8 @@ def test_view_shows_force_against_limit_and_who_is_waited_for() -> None:
         visibility=0.42,
         visible=False,
         max_height=[],
+        force_rate_n_s=0.0,
+        crossing_tick=-1,
         max_node_speed_m_s=0.0,
         grasped={},
     )
@@ -64,6 +67,10 @@ def test_view_shows_force_against_limit_and_who_is_waited_for() -> None:
     assert "0.51 N of 0.50 N" in output.getvalue()
     assert "42.0%" in output.getvalue()
     assert "motion waiting: sim" in output.getvalue()
+    assert "crosses" not in output.getvalue()
+    coming = msgspec.structs.replace(verdict, tick=120, crossing_tick=128)
+    Console(file=output, width=100).print(render(TrialView(verdict=coming)))
+    assert "crosses its limit in about 8 ticks" in output.getvalue()
 
 
 def test_without_a_terminal_each_change_is_one_line() -> None:

@@ -37,7 +37,8 @@ class Unreachable(FrasError):
 def verdict(tick: int, trial: str = "t-1") -> Verdict:
     return Verdict(
         tick=tick, trial=trial, level="ok", ok=True, reason="", max_force_n=0.1, limit_n=0.5,
-        hard_limit_n=1.0, visibility=0.0, visible=False, max_height=[], max_node_speed_m_s=0.0,
+        hard_limit_n=1.0, visibility=0.0, visible=False, max_height=[], force_rate_n_s=0.0,
+        crossing_tick=-1, max_node_speed_m_s=0.0,
         grasped={},
     )  # fmt: skip
 

@@ -78,6 +78,8 @@ class Bench(ShellBench):
                 visibility=0.0,
                 visible=False,
                 max_height=[],
+                force_rate_n_s=0.0,
+                crossing_tick=-1,
                 max_node_speed_m_s=0.0,
                 grasped={},
             )

@@ -154,7 +154,8 @@ def tissue_state(tick: int, trial: str) -> TissueState:
 def verdict(tick: int, trial: str) -> Verdict:
     return Verdict(
         tick=tick, trial=trial, level="ok", ok=True, reason="", max_force_n=0.0, limit_n=0.5,
-        hard_limit_n=1.0, visibility=0.0, visible=False, max_height=[], max_node_speed_m_s=0.0,
+        hard_limit_n=1.0, visibility=0.0, visible=False, max_height=[], force_rate_n_s=0.0,
+        crossing_tick=-1, max_node_speed_m_s=0.0,
         grasped={},
     )  # fmt: skip
 

@@ -41,6 +41,7 @@ def _box(
         triangles=_faces(counts, flip=flip),
         fixed_points_m=np.array(fixed, dtype=np.float64).reshape(-1, 3),
         roi_m=np.array(roi, dtype=np.float64),
+        dt_s=0.02,
     )
 
 

@@ -1,5 +1,6 @@
 """The blocks: a partition of the tissue, each bound to its material point."""
 
+import dataclasses
 import itertools
 
 import numpy as np
@@ -11,7 +12,6 @@ from fras_sa.awareness import (
     Awareness,
     AwarenessParameters,
     NoBlocks,
-    TissueModel,
     UnknownName,
     make_blocks,
 )
@@ -54,9 +54,7 @@ def test_blocks_follow_an_affine_motion_exactly(box, n, matrix, shift):
 @pytest.mark.parametrize("n", [2, 4, 5, 8, 10, 20, 40])
 def test_a_point_on_an_edge_belongs_to_the_upper_cell_even_from_float32(box, n):
     model = box()
-    single = TissueModel(
-        model.nodes_m.astype(np.float32), model.triangles, model.fixed_points_m, model.roi_m
-    )
+    single = dataclasses.replace(model, nodes_m=model.nodes_m.astype(np.float32))
     for scene in (model, single):
         blocks = make_blocks(scene, n)
         for k in range(n):
@@ -84,7 +82,7 @@ def test_cells_without_surface_are_dropped_and_rows_close_up(box):
     model = box((11, 13, 2))
     centroids = model.nodes_m[model.triangles].mean(axis=1)
     hole = (centroids[:, 0] > 0.06) & (centroids[:, 1] < 0.04)
-    cut = TissueModel(model.nodes_m, model.triangles[~hole], model.fixed_points_m, model.roi_m)
+    cut = dataclasses.replace(model, triangles=model.triangles[~hole])
     blocks = make_blocks(cut, 5)
     dropped = {f"b({i},{j})" for i in (4, 5) for j in (1, 2)}
     assert set(make_blocks(model, 5).names) - set(blocks.names) == dropped
@@ -97,7 +95,7 @@ def test_height_is_that_of_a_curved_top_face(box):
     model = box((21, 25, 2))
     nodes = model.nodes_m.copy()
     nodes[:, 2] += 0.2 * nodes[:, 0] + 0.1 * nodes[:, 1]
-    slanted = TissueModel(nodes, model.triangles, model.fixed_points_m, model.roi_m)
+    slanted = dataclasses.replace(model, nodes_m=nodes)
     blocks = make_blocks(slanted, 6)
     x, y, z = blocks.rest_m.T
     np.testing.assert_allclose(z, 0.005 + 0.2 * x + 0.1 * y, atol=1e-12)
@@ -113,8 +111,8 @@ def test_a_tissue_without_any_block_is_refused(box):
     model = box((11, 13, 2))
     centroids = model.nodes_m[model.triangles].mean(axis=1)
     ring = np.abs(centroids[:, :2] - (0.05, 0.06)).max(axis=1) > 0.03
-    hollow = TissueModel(
-        model.nodes_m, model.triangles[ring], model.fixed_points_m, np.array([0.01, 0.01, 0.0])
+    hollow = dataclasses.replace(
+        model, triangles=model.triangles[ring], roi_m=np.array([0.01, 0.01, 0.0])
     )
     with pytest.raises(NoBlocks):
         Awareness(AwarenessParameters(blocks=1), hollow)

@@ -21,16 +21,17 @@ from fras_sa.awareness import (
 )
 
 FAR = np.array([0.0, 0.0, 0.3])
+TICK = 0
 
 
 def robot(name=None, phase="lift", tip=FAR, jaw=-0.3):
     action = None if name is None else ActionView(name, "psm1", "b(3,4)", phase)
-    return RobotView({"psm1": ArmView(tip, jaw), "psm2": ArmView(FAR, 1.0)}, action)
+    return RobotView(TICK, {"psm1": ArmView(tip, jaw), "psm2": ArmView(FAR, 1.0)}, action)
 
 
 def tissue(model, force=0.0, *, lift=0.0, tool=(0.0, 0.0, 0.0), converged=True):
     return TissueView(
-        tick=3,
+        tick=TICK,
         nodes_m=model.nodes_m + np.array([0.0, 0.0, lift]),
         max_force_n=force,
         tool_force_n={"psm1": np.array(tool), "psm2": np.zeros(3)},
@@ -129,7 +130,7 @@ def test_a_broken_tissue_state_is_invalid_and_gives_no_context(box, spoil, metri
     assert (verdict.level, verdict.reason, verdict.visible) == ("invalid", "solver", False)
     assert not math.isinf(verdict.force_n)
     assert verdict.max_height == ()
-    with pytest.raises(UnusableState, match="tick 3"):
+    with pytest.raises(UnusableState, match="tick 0"):
         sa.context(broken, robot(), Memory())
     with pytest.raises(UnusableState):
         sa.target(broken, robot(), action="reach", arm="psm1", block="b(1,1)")
@@ -149,7 +150,7 @@ def test_an_unconverged_tick_is_invalid_but_its_kept_state_is_still_told(box):
     [
         robot(tip=np.full(3, np.nan)),
         robot(jaw=math.nan),
-        RobotView({}, ActionView("pull", "psm1", "b(1,1)", "lift")),
+        RobotView(TICK, robot().arms, ActionView("pull", "psm3", "b(1,1)", "lift")),
     ],
 )
 def test_a_broken_robot_state_is_invalid(box, broken):
@@ -157,7 +158,7 @@ def test_a_broken_robot_state_is_invalid(box, broken):
     sa = Awareness(AwarenessParameters(), model)
     verdict = sa.judge(tissue(model), broken, Memory())
     assert (verdict.level, verdict.reason) == ("invalid", "robot")
-    with pytest.raises(UnusableState, match="psm1"):
+    with pytest.raises(UnusableState, match="psm"):
         sa.context(tissue(model), broken, Memory())
 
 

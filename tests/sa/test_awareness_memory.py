@@ -10,11 +10,13 @@ from fras_sa.awareness import (
     Level,
     Memory,
     RobotView,
+    Trend,
 )
 from fras_sa.awareness.memory import remember
 
 PARAMETERS = AwarenessParameters()
 PSM1 = frozenset({"psm1"})
+STILL = Trend()
 
 
 def tick(
@@ -26,16 +28,17 @@ def tick(
     visible: bool = False,
     arm: str = "psm1",
     jaw: float = -0.3,
+    trend: Trend = STILL,
 ) -> Memory:
     action = ActionView(name, arm, "b(1,1)", phase)
-    robot = RobotView({a: ArmView(np.zeros(3), jaw) for a in ("psm1", "psm2")}, action)
-    return remember(memory, PARAMETERS, robot, level, visible=visible)
+    robot = RobotView(0, {a: ArmView(np.zeros(3), jaw) for a in ("psm1", "psm2")}, action)
+    return remember(memory, PARAMETERS, robot, level, visible=visible, trend=trend)
 
 
 def test_starts_empty_and_stays_so_without_an_action():
-    robot = RobotView({}, None)
-    assert remember(Memory(), PARAMETERS, robot, "ok", visible=False) == Memory()
-    assert remember(Memory(PSM1), PARAMETERS, robot, "ok", visible=False).max_height == PSM1
+    robot = RobotView(0, {}, None)
+    for before in (Memory(), Memory(PSM1)):
+        assert remember(before, PARAMETERS, robot, "ok", visible=False, trend=STILL) == before
 
 
 @pytest.mark.parametrize("phase", ["lift", "settle", "stop", "retreat"])
@@ -125,6 +128,6 @@ def test_a_restart_at_any_tick_changes_nothing():
         straight = tick(straight, name, phase, level=level, arm=arm)
         restarted = tick(restarted, name, phase, level=level, arm=arm)
         last = ActionView(name, arm, "b(1,1)", phase)
-        restarted = Memory.restored(sorted(restarted.max_height), last)
+        restarted = Memory.restored(sorted(restarted.max_height), last, STILL)
         assert restarted == straight
     assert straight.max_height == {"psm2"}

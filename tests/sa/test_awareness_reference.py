@@ -170,7 +170,7 @@ def test_fast_and_slow_agree_on_random_states(box, seed):
         nodes, arms, action, force = random_state(rng, model, n)
         max_height = {name for name in arms if rng.random() < 0.3}
         tissue = TissueView(0, nodes, force, {}, converged=True)
-        robot = RobotView({k: ArmView(*v) for k, v in arms.items()}, action)
+        robot = RobotView(0, {k: ArmView(*v) for k, v in arms.items()}, action)
         verdict = sa.judge(tissue, robot, Memory())
         assert verdict.level == check_failure(force, action)
         assert verdict.visibility == pytest.approx(visible(p_close, nodes.tolist(), roi), abs=1e-9)
@@ -192,6 +192,7 @@ def test_a_verdict_takes_a_millisecond_at_most_and_a_context_three(box, record_p
     nodes = (model.nodes_m + np.array([0, 0, 0.005])).astype(np.float32)
     tissue = TissueView(0, nodes, 0.4, {"psm1": np.zeros(3), "psm2": np.zeros(3)}, converged=True)
     robot = RobotView(
+        0,
         {"psm1": ArmView(nodes[300].astype(float), -0.3), "psm2": ArmView(np.zeros(3), 1.0)},
         ActionView("pull", "psm1", "b(1,1)", "lift"),
     )

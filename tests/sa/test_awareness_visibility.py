@@ -123,6 +123,7 @@ def test_a_mesh_of_uneven_triangles_is_sampled_evenly():
         np.array([*fan, [1, n + 1, n + 2]]),
         np.empty((0, 3)),
         np.zeros(3),
+        dt_s=0.02,
     )
     points = make_close_points(model, 0.02, 0.001)
     in_fan = np.any(points.corners == 0, axis=0)

@@ -9,6 +9,7 @@ from rich.text import Text
 
 from fras_cli.report import Percentiles, Summary, specifications_in_words
 from fras_cli.trial import TrialView
+from fras_common.messages import Verdict
 
 ACTION_WORDS = {
     "reach": "reaching for",
@@ -85,6 +86,7 @@ def render(view: TrialView) -> RenderableType:
                 "  force      ",
                 (bar(force), style[verdict.level]),
                 f" {verdict.max_force_n:5.2f} N of {verdict.limit_n:.2f} N",
+                crossing_words(verdict),
             )
         )
         lines.append(
@@ -104,6 +106,13 @@ def render(view: TrialView) -> RenderableType:
         Text(f"  {service} {state}", style="yellow") for service, state in view.waiting.items()
     )
     return Group(*lines)
+
+
+def crossing_words(verdict: Verdict) -> str:
+    """When the force will cross the limit of the action, if that is in sight."""
+    if verdict.crossing_tick < 0:
+        return ""
+    return f", crosses its limit in about {verdict.crossing_tick - verdict.tick} ticks"
 
 
 def bar(fraction: float) -> str:

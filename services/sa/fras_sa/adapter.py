@@ -31,6 +31,7 @@ def model_of(model: m.TissueModel) -> TissueModel:
         triangles=model.surface.ints(),
         fixed_points_m=model.fixed_points_m.floats(),
         roi_m=np.array(model.roi_m),
+        dt_s=model.dt_s,
     )
 
 
@@ -50,6 +51,7 @@ def robot_of(state: m.RobotState) -> RobotView:
     """Read the arms at one tick."""
     action = state.action
     return RobotView(
+        tick=state.tick,
         arms={
             name: ArmView(np.array(arm.tip_in_world.position_m), arm.jaw_rad)
             for name, arm in state.arms.items()
@@ -74,6 +76,8 @@ def verdict_of(
         visibility=_finite(judgement.visibility),
         visible=judgement.visible,
         max_height=list(judgement.max_height),
+        force_rate_n_s=judgement.rate_n_s,
+        crossing_tick=judgement.crossing_tick,
         max_node_speed_m_s=_finite(state.max_node_speed_m_s),
         grasped={arm: len(nodes) for arm, nodes in state.grasped.items()},
     )

@@ -242,6 +242,8 @@ def verdict(tick: int) -> Verdict:
         visibility=visibility(tick),
         visible=visibility(tick) > 0.7,
         max_height=["psm1"] if above else [],
+        force_rate_n_s=0.0,
+        crossing_tick=-1,
         max_node_speed_m_s=0.0,
         grasped={"psm1": 1} if tick > 22 else {},
     )

@@ -126,6 +126,7 @@ def test_changes_name_target_arm_and_what_is_ruled_out(
             "deviation: -closed_gripper(psm1) expected after release(psm1)",
             "after release(psm1), closed_gripper(psm1) still holds, against expectation",
         ),
+        ("hold:stale", "the states of tissue and robot did not belong together"),
         ("hold:sa", "held by sa and not let go"),
         ("gate:speed", "the safety gate speed stopped the arm"),
         ("something new", "something new"),

@@ -19,6 +19,8 @@ _REASONS = {
     "nothing_in_reach": "the jaw closed on nothing",
     "replans": "the number of re-plans allowed is used up",
     "hold:solver": "the tissue simulation had no valid solution",
+    "hold:robot": "the state of the robot was unusable",
+    "hold:stale": "the states of tissue and robot did not belong together",
 }
 
 

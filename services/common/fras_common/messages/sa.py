@@ -20,7 +20,12 @@ class Verdict(Header, frozen=True, kw_only=True):
     visibility : float
         Share of the tissue around the region of interest that has been lifted clear of it.
     max_height : list of arms
-        Arms that may not pull higher; SA's whole memory.
+        Arms that may not pull higher.
+    force_rate_n_s : float
+        How fast that force changes, smoothed over two ticks or so; an invalid tick leaves it.
+    crossing_tick : int
+        First tick at which the force is expected above the limit that binds the action (soft in
+        a pull, else hard); -1 if none is in sight.
     grasped : dict of arm to number of nodes held
     """
 
@@ -33,6 +38,8 @@ class Verdict(Header, frozen=True, kw_only=True):
     visibility: float
     visible: bool
     max_height: list[str]
+    force_rate_n_s: float
+    crossing_tick: int
     max_node_speed_m_s: float
     grasped: dict[str, int]
 

@@ -17,6 +17,7 @@ from .errors import (
 )
 from .memory import Memory
 from .parameters import AwarenessParameters
+from .trend import Trend
 from .views import (
     ACTIONS,
     ARMS,
@@ -52,6 +53,7 @@ __all__ = [
     "RobotView",
     "TissueModel",
     "TissueView",
+    "Trend",
     "UnknownName",
     "UnusableState",
     "make_blocks",

@@ -13,7 +13,14 @@ from numpy.typing import NDArray
 from . import fluents as fl
 from .blocks import Blocks, make_blocks
 from .errors import MalformedModel, UnusableState
-from .failure import check_failure, measured_force, robot_problem, tissue_problem
+from .failure import (
+    binding_limit,
+    check_failure,
+    measured_force,
+    robot_problem,
+    staleness,
+    tissue_problem,
+)
 from .memory import Memory, remember
 from .parameters import AwarenessParameters
 from .target import compute_target
@@ -39,6 +46,10 @@ class Judgement:
         Whether that exceeds delta.
     max_height : tuple of str
         Arms that may not pull on, sorted.
+    rate_n_s : float [N/s]
+        How fast the force changes; while the state is invalid, how fast it did before.
+    crossing_tick : int
+        First tick expected above the limit that binds the action; -1 if none is in sight.
     memory : Memory
         For the next tick.
     """
@@ -51,6 +62,8 @@ class Judgement:
     visibility: float
     visible: bool
     max_height: tuple[str, ...]
+    rate_n_s: float
+    crossing_tick: int
     memory: Memory
 
 
@@ -106,6 +119,7 @@ class Awareness:
         _check(model)
         self._parameters = parameters
         self._n_nodes = len(model.nodes_m)
+        self._dt_s = model.dt_s
         self._roi_m = np.array(model.roi_m, dtype=np.float64)
         self._fixed_points_m = np.array(model.fixed_points_m, dtype=np.float64)
         # Every context hands these two out again.
@@ -128,7 +142,7 @@ class Awareness:
         Parameters
         ----------
         tissue, robot : TissueView, RobotView
-            Both of the tick to judge.
+            Both of the tick to judge, which is the one after the memory's.
         memory : Memory
             After the tick before; `Memory()` at the start of a trial.
 
@@ -137,12 +151,17 @@ class Awareness:
         Judgement
         """
         parameters = self._parameters
-        failure = check_failure(parameters, tissue, robot, self._n_nodes)
+        last = memory.trend
+        failure = check_failure(
+            parameters, tissue, robot, n_nodes=self._n_nodes, last_tick=last.tick
+        )
+        valid = failure.level != "invalid"
         visibility = math.nan
-        if failure.level != "invalid" or not tissue_problem(tissue, self._n_nodes):
+        if valid or not tissue_problem(tissue, self._n_nodes):
             visibility = self._close.visible_fraction(tissue.nodes_m)
         visible = visibility > parameters.visible_fraction
-        memory = remember(memory, parameters, robot, failure.level, visible=visible)
+        trend = last.after(tissue.tick, failure.force_n if valid else None, self._dt_s)
+        memory = remember(memory, parameters, robot, failure.level, visible=visible, trend=trend)
         return Judgement(
             level=failure.level,
             ok=failure.level == "ok",
@@ -152,6 +171,8 @@ class Awareness:
             visibility=visibility,
             visible=visible,
             max_height=tuple(sorted(memory.max_height)),
+            rate_n_s=trend.rate_n_s,
+            crossing_tick=trend.crossing_tick(binding_limit(parameters, robot), self._dt_s),
             memory=memory,
         )
 
@@ -172,7 +193,8 @@ class Awareness:
         Raises
         ------
         UnusableState
-            If a position, force or angle is not finite: a fluent left out would be told false.
+            If a position, force or angle is not finite, an arm is missing, or the ticks differ:
+            a fluent left out would be told false.
         """
         self._require_usable(tissue, robot)
         parameters = self._parameters
@@ -205,7 +227,7 @@ class Awareness:
         UnknownName
             If the action, arm or block does not exist.
         UnusableState
-            If a position, force or angle is not finite.
+            As for a context.
         """
         self._require_usable(tissue, robot)
         return compute_target(
@@ -215,7 +237,7 @@ class Awareness:
     def _require_usable(self, tissue: TissueView, robot: RobotView) -> None:
         if problem := tissue_problem(tissue, self._n_nodes):
             raise UnusableState(f"tissue state of tick {tissue.tick}", problem)
-        if problem := robot_problem(robot):
+        if problem := staleness(tissue, robot) or robot_problem(robot):
             raise UnusableState(f"robot state of tick {tissue.tick}", problem)
 
 
@@ -230,6 +252,8 @@ def _check(model: TissueModel) -> None:
             raise MalformedModel(field, f"shape {array.shape}, expected {shape}")
         if not np.isfinite(array).all():
             raise MalformedModel(field, "not finite")
+    if not (math.isfinite(model.dt_s) and model.dt_s > 0.0):
+        raise MalformedModel("dt_s", f"{model.dt_s}, must be finite and > 0")
     triangles = model.triangles
     if triangles.ndim != 2 or triangles.shape[1] != 3 or len(triangles) == 0:
         raise MalformedModel("triangles", f"shape {triangles.shape}, expected (n, 3), n > 0")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .parameters import AwarenessParameters
-from .views import Level, RobotView, TissueView
+from .views import ARMS, Level, RobotView, TissueView
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,7 +19,7 @@ class Failure:
         soft: above the limit in a pull; hard: above the hard limit in any action; invalid: the
         state is no basis for moving on.
     reason : str
-        Empty if ok, else `force_soft`, `force_hard`, `solver` or `robot`.
+        Empty if ok, else `force_soft`, `force_hard`, `solver`, `robot` or `stale`.
     force_n : float [N]
         The force by the chosen metric; NaN if it was not finite.
     """
@@ -62,8 +62,28 @@ def robot_problem(robot: RobotView) -> str:
     return ""
 
 
+def staleness(tissue: TissueView, robot: RobotView) -> str:
+    """Return what shows that a state is old or missing; empty if nothing does."""
+    if robot.tick != tissue.tick:
+        return f"robot of tick {robot.tick} with tissue of tick {tissue.tick}"
+    missing = [arm for arm in ARMS if arm not in robot.arms]
+    return f"no state of {' and '.join(missing)}" if missing else ""
+
+
+def binding_limit(parameters: AwarenessParameters, robot: RobotView) -> float:
+    """Return the limit that the action under way meets first [N]; infinite if none binds."""
+    if parameters.no_limit:
+        return math.inf
+    return parameters.force_limit_n if _pulling(robot) else parameters.hard_n
+
+
 def check_failure(
-    parameters: AwarenessParameters, tissue: TissueView, robot: RobotView, n_nodes: int
+    parameters: AwarenessParameters,
+    tissue: TissueView,
+    robot: RobotView,
+    *,
+    n_nodes: int,
+    last_tick: int,
 ) -> Failure:
     """Return the level of one tick.
 
@@ -75,6 +95,8 @@ def check_failure(
         Both of the same tick.
     n_nodes : int
         Nodes of the model.
+    last_tick : int
+        The tick judged before; this one must follow it.
 
     Returns
     -------
@@ -88,13 +110,18 @@ def check_failure(
     force = measured_force(parameters, tissue)
     if not tissue.converged or tissue_problem(tissue, n_nodes):
         return Failure("invalid", "solver", force if math.isfinite(force) else math.nan)
+    if tissue.tick != last_tick + 1 or staleness(tissue, robot):
+        return Failure("invalid", "stale", force)
     if robot_problem(robot):
         return Failure("invalid", "robot", force)
     if parameters.no_limit:
         return Failure("ok", "", force)
     if force > parameters.hard_n:
         return Failure("hard", "force_hard", force)
-    pulling = robot.action is not None and robot.action.name == "pull"
-    if pulling and force > parameters.force_limit_n:
+    if _pulling(robot) and force > parameters.force_limit_n:
         return Failure("soft", "force_soft", force)
     return Failure("ok", "", force)
+
+
+def _pulling(robot: RobotView) -> bool:
+    return robot.action is not None and robot.action.name == "pull"

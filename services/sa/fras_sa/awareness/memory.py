@@ -1,7 +1,7 @@
-"""Memory: which arms may not pull on, the fluent `max_height(A)`.
+"""Memory: what no single state shows, the fluent `max_height(A)` and the trend of the force.
 
-It is the one fluent that no single state shows. The memory is an immutable value, small enough
-to be restored from the last verdict and the robot's state of that tick.
+The memory is an immutable value, small enough to be restored from the last verdict and the
+robot's state of that tick.
 """
 
 from collections.abc import Iterable
@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Self
 
 from .parameters import AwarenessParameters
+from .trend import AT_REST, Trend
 from .views import FINAL_PHASES, ActionView, Level, RobotView
 
 
@@ -23,15 +24,18 @@ class Memory:
     running : (str, str) or None
         Name and arm of the action that the last tick left unfinished; tells the first tick of a
         move or release from its later ones.
+    trend : Trend
+        Of the force.
     """
 
     max_height: frozenset[str] = frozenset()
     running: tuple[str, str] | None = None
+    trend: Trend = AT_REST
 
     @classmethod
-    def restored(cls, max_height: Iterable[str], action: ActionView | None) -> Self:
+    def restored(cls, max_height: Iterable[str], action: ActionView | None, trend: Trend) -> Self:
         """Return the memory after tick k, from verdict(k) and the action of robot/state(k)."""
-        return cls(frozenset(max_height), _unfinished(action))
+        return cls(frozenset(max_height), _unfinished(action), trend)
 
 
 def remember(
@@ -41,6 +45,7 @@ def remember(
     level: Level,
     *,
     visible: bool,
+    trend: Trend,
 ) -> Memory:
     """Return the memory after one tick.
 
@@ -56,6 +61,8 @@ def remember(
         The level of this tick.
     visible : bool
         Whether the ROI is visible in this tick.
+    trend : Trend
+        Of the force, after this tick.
 
     Returns
     -------
@@ -74,7 +81,7 @@ def remember(
     """
     action = robot.action
     if action is None:
-        return Memory(memory.max_height)
+        return Memory(memory.max_height, None, trend)
     max_height = memory.max_height
     if action.name in ("move", "release") and memory.running != (action.name, action.arm):
         max_height = max_height - {action.arm}
@@ -88,7 +95,7 @@ def remember(
     )
     if crossed or pulled_out:
         max_height = max_height | {action.arm}
-    return Memory(max_height, _unfinished(action))
+    return Memory(max_height, _unfinished(action), trend)
 
 
 def _unfinished(action: ActionView | None) -> tuple[str, str] | None:

@@ -40,12 +40,15 @@ class TissueModel:
         Attachment points (P_f); may be empty.
     roi_m : ndarray, shape (3,) [m]
         The region of interest (p_ROI).
+    dt_s : float [s]
+        Duration of a tick.
     """
 
     nodes_m: FloatArray
     triangles: IndexArray
     fixed_points_m: FloatArray
     roi_m: FloatArray
+    dt_s: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,7 +106,18 @@ class ActionView(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RobotView:
-    """The arms by name, and the action in progress or None."""
+    """The robot at one tick.
 
+    Parameters
+    ----------
+    tick : int
+        As motion counts it; the tissue's must be the same.
+    arms : mapping of str to ArmView
+        Each of `ARMS`, by name.
+    action : ActionView or None
+        The action in progress.
+    """
+
+    tick: int
     arms: Mapping[str, ArmView]
     action: ActionView | None = None
