@@ -35,7 +35,10 @@ class Bench(ShellBench):
     """Situation awareness, and a client that plays sim and motion."""
 
     def __init__(self) -> None:
-        super().__init__("sa", AwarenessService, client="sim/test")
+        self.now_s = 0.0
+        super().__init__(
+            "sa", lambda host: AwarenessService(host, lambda: self.now_s), client="sim/test"
+        )
         self.verdicts: list[Verdict] = self.heard(VERDICT)
         self.model = self.client.publisher(TISSUE_MODEL)
         self.tissue = self.client.publisher(TISSUE_STATE)
@@ -73,6 +76,25 @@ def test_join_waits_for_both_and_keeps_the_order() -> None:
     join.add(tissue(0))
     join.add(robot(0))
     assert join.take() is None
+
+
+def test_join_tells_whose_state_is_missing() -> None:
+    join = TickJoin()
+    assert (join.missing, join.is_empty) == ("", True)
+    join.add(robot(0))
+    assert (join.missing, join.is_empty) == ("sim", False)
+    join.add(tissue(0))
+    assert join.missing == ""
+    assert join.take() is not None
+    assert (join.missing, join.is_empty) == ("", True)
+    join.add(tissue(1))
+    assert join.missing == "motion"
+    gap = TickJoin()
+    gap.add(robot(1))
+    gap.add(tissue(1))
+    assert gap.missing == "motion"
+    gap.add(robot(0))
+    assert gap.missing == "sim"
 
 
 @pytest.mark.parametrize("first", ["tissue", "robot"])
@@ -177,3 +199,76 @@ def test_question_about_another_trial_is_refused(bench: Bench) -> None:
     asked = TargetRequest(trial="old", action="reach", arm="psm1", block="b(4,4)")
     (target,) = bench.ask(SA_TARGET, asked)
     assert context.remote_kind == target.remote_kind == "OtherTrial"
+
+
+def test_robot_state_that_comes_again_is_answered_again_and_changes_nothing(bench: Bench) -> None:
+    bench.reset()
+    bench.tick(0)
+    bench.tick(1, force_n=0.2)
+    bench.robot.put(msgspec.structs.replace(robot(1), holds={"person": "look"}))
+    bench.tissue.put(tissue(1, force_n=0.9))
+    bench.robot.put(robot(0))
+    bench.settle()
+    first, again = bench.verdicts[1:]
+    assert msgspec.structs.replace(again, seq=first.seq, stamp_ns=first.stamp_ns) == first
+    assert again.seq == first.seq + 1
+    bench.tick(2, force_n=0.3)
+    assert [verdict.tick for verdict in bench.verdicts] == [0, 1, 1, 2]
+    assert bench.verdicts[-1].force_rate_n_s == pytest.approx(0.5 * (0.1 / 0.02 + 5.0))
+
+
+def states_over(bench: Bench, seconds: float) -> list[str]:
+    """State of the service now and that much later."""
+    found = [bench.host.state]
+    bench.now_s += seconds
+    bench.settle()
+    return [*found, bench.host.state]
+
+
+@pytest.mark.parametrize("missing", ["sim", "motion"])
+def test_health_says_whose_state_the_verdict_waits_for(bench: Bench, missing: str) -> None:
+    bench.reset()
+    bench.tick(0)
+    assert "waiting" not in bench.host.state
+    if missing == "sim":
+        bench.robot.put(robot(1))
+    else:
+        bench.tissue.put(tissue(1))
+    bench.settle()
+    early, late = states_over(bench, 0.6)
+    assert ("waiting" in early, late) == (False, f"waiting: {missing}")
+    assert [verdict.tick for verdict in bench.verdicts] == [0]
+    bench.tick(1)
+    assert "waiting" not in bench.host.state
+    assert "waiting" not in states_over(bench, 60.0)[1]
+
+
+def test_health_says_that_the_model_is_missing(bench: Bench) -> None:
+    scene = SceneSection(roi_m=(0.05, 0.06, 0.0))
+    bench.ask(SA_RESET, ResetRequest(trial="t", scenario=Scenario(scene=scene)))
+    assert "waiting" not in states_over(bench, 60.0)[1]
+    bench.tick(0)
+    assert states_over(bench, 0.6)[1] == "waiting: sim"
+    bench.model.put(msgspec.structs.replace(MODEL, trial="t"))
+    bench.settle()
+    assert "waiting" not in bench.host.state
+    assert [verdict.tick for verdict in bench.verdicts] == [0]
+
+
+def test_question_about_a_tick_to_come_waits_for_motion(bench: Bench) -> None:
+    bench.reset()
+    bench.tick(0)
+    bench.ask(SA_CONTEXT, ContextRequest(trial="t", request_id="c1", min_tick=1))
+    assert states_over(bench, 0.6)[1] == "waiting: motion"
+
+
+def test_moments_of_waiting_one_after_the_other_are_not_added_up(bench: Bench) -> None:
+    bench.reset()
+    for tick in range(4):
+        bench.robot.put(robot(tick))
+        bench.settle()
+        bench.now_s += 0.3
+        bench.settle()
+        assert "waiting" not in bench.host.state
+        bench.tissue.put(tissue(tick))
+        bench.settle()

@@ -4,6 +4,7 @@ import math
 
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
 from fras_common import messages as m
 from fras_common.scenario import AwarenessSection
@@ -97,6 +98,14 @@ def context_of(view: ContextView, state: m.TissueState, request_id: str) -> m.Co
         roi_m=(float(roi[0]), float(roi[1]), float(roi[2])),
         fixed_points_m=[(float(x), float(y), float(z)) for x, y, z in view.fixed_points_m],
     )
+
+
+def target_of(position: NDArray[np.float64] | None) -> m.TargetReply:
+    """Put a target on the wire, or that there is none."""
+    if position is None:
+        return m.TargetReply(position_m=None)
+    x, y, z = (float(value) for value in position)
+    return m.TargetReply(position_m=(x, y, z))
 
 
 def _finite(value: float) -> float:

@@ -30,6 +30,20 @@ class TickJoin:
         else:
             self._robots[state.tick] = state
 
+    @property
+    def is_empty(self) -> bool:
+        """Whether no state waits for anything."""
+        return not (self._tissues or self._robots)
+
+    @property
+    def missing(self) -> str:
+        """Whose state the next tick lacks, if anything of it or of a later one is here."""
+        if self.is_empty:
+            return ""
+        if self._next not in self._robots:
+            return "motion"
+        return "" if self._next in self._tissues else "sim"
+
     def take(self) -> Moment | None:
         """Take the next tick, or None while it is incomplete."""
         tick = self._next

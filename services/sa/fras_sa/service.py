@@ -1,5 +1,8 @@
 """Situation awareness's shell: joins tissue and robot by tick, publishes a verdict on each."""
 
+import time
+from collections.abc import Callable
+
 from fras_common import messages as m
 from fras_common.codec import content_digest
 from fras_common.errors import FrasError
@@ -15,46 +18,40 @@ from fras_common.topics import (
     TISSUE_STATE,
     VERDICT,
 )
-from fras_sa.adapter import (
-    context_of,
-    model_of,
-    parameters_of,
-    robot_of,
-    tissue_of,
-    verdict_of,
-)
-from fras_sa.awareness import Awareness, AwarenessError, Memory
+from fras_sa.awareness import AwarenessError
 from fras_sa.errors import NothingKnown, OtherTrial
-from fras_sa.join import Moment, TickJoin
+from fras_sa.trial import WatchedTrial
+from fras_sa.waiting import Waiting
 
 
 class AwarenessService:
-    """Judges each tick; answers for context and targets."""
+    """Judges each tick; answers for context and targets.
 
-    def __init__(self, host: ServiceHost) -> None:
+    Parameters
+    ----------
+    host : ServiceHost
+    clock : callable
+        Returns monotonic seconds; only to tell in health who has been waited for.
+    """
+
+    def __init__(self, host: ServiceHost, clock: Callable[[], float] = time.monotonic) -> None:
         self._host = host
-        self._begin(Scenario())
+        self._clock = clock
+        self._trial = WatchedTrial(Scenario())
+        self._pending: list[Deferred[m.ContextRequest, m.Context]] = []
+        self._waiting = Waiting()
         self._verdict = host.publisher(VERDICT)
         self._context = host.publisher(CONTEXT)
         host.subscribe(TISSUE_MODEL, self._on_model)
-        host.subscribe(TISSUE_STATE, self._on_state)
-        host.subscribe(ROBOT_STATE, self._on_state)
+        host.subscribe(TISSUE_STATE, self._on_tissue)
+        host.subscribe(ROBOT_STATE, self._on_robot)
         host.serve(SA_RESET, self._reset)
         host.serve(SA_TARGET, self._target)
         host.serve_deferred(SA_CONTEXT, self._on_context_request)
 
-    def _begin(self, scenario: Scenario) -> None:
-        self._parameters = parameters_of(scenario.awareness)
-        self._awareness: Awareness | None = None
-        self._problem: AwarenessError | None = None
-        self._memory = Memory()
-        self._join = TickJoin()
-        self._now: Moment | None = None
-        self._pending: list[Deferred[m.ContextRequest, m.Context]] = []
-
     def _reset(self, request: m.ResetRequest) -> m.ResetReply:
         self._fail_pending(NothingKnown("another trial began"))
-        self._begin(request.scenario)
+        self._trial = WatchedTrial(request.scenario)
         self._host.enter_trial(request.trial)
         return m.ResetReply(digest=content_digest(request.trial, request.scenario, request.mesh))
 
@@ -65,80 +62,67 @@ class AwarenessService:
 
     def _on_model(self, model: m.TissueModel) -> None:
         try:
-            self._awareness = Awareness(self._parameters, model_of(model))
+            self._trial.see_model(model)
         except AwarenessError as error:
-            self._problem = error
             self._fail_pending(error)
             raise
         self._judge_next()
 
-    def _on_state(self, state: m.TissueState | m.RobotState) -> None:
-        self._join.add(state)
+    def _on_tissue(self, state: m.TissueState) -> None:
+        self._trial.see_state(state)
+        self._judge_next()
+
+    def _on_robot(self, state: m.RobotState) -> None:
+        said = self._trial.verdict
+        if said is not None and said.tick == state.tick:
+            # Asked again for the same tick: the same answer again.
+            self._verdict.put(said)
+            return
+        self._trial.see_state(state)
         self._judge_next()
 
     def _judge_next(self) -> None:
-        """Judge the next tick as soon as both of its states and the model are here."""
-        if self._awareness is None or (moment := self._join.take()) is None:
+        verdict = self._trial.judge_next()
+        if verdict is None:
             return
-        tick = moment.tissue.tick
-        judgement = self._awareness.judge(
-            tissue_of(moment.tissue), robot_of(moment.robot), self._memory
-        )
-        self._memory = judgement.memory
-        self._now = moment
-        self._host.tick = tick
-        self._verdict.put(verdict_of(judgement, self._parameters, moment.tissue))
-        if judgement.level != "ok":
+        self._host.tick = verdict.tick
+        self._verdict.put(verdict)
+        if not verdict.ok:
             self._host.log.info(
-                "verdict", tick=tick, level=judgement.level, force_n=judgement.force_n
+                "verdict", tick=verdict.tick, level=verdict.level, force_n=verdict.max_force_n
             )
         waiting, self._pending = self._pending, []
         for pending in waiting:
             self._on_context_request(pending)
 
     def _on_context_request(self, pending: Deferred[m.ContextRequest, m.Context]) -> None:
-        request = pending.request
-        if request.trial != self._host.gate.trial:
-            pending.fail(OtherTrial(request.trial, self._host.gate.trial))
-            return
-        if self._problem is not None:
-            pending.fail(self._problem)
-            return
-        if self._now is None or self._now.tissue.tick < request.min_tick:
-            self._pending.append(pending)
-            return
-        awareness, now = self._known()
+        """Answer, or keep the question until its tick has been judged."""
+        request, trial = pending.request, self._trial
         try:
-            view = awareness.context(tissue_of(now.tissue), robot_of(now.robot), self._memory)
-        except AwarenessError as error:
+            self._require_trial(request.trial)
+            if trial.problem is None and (trial.verdict is None or trial.tick < request.min_tick):
+                self._pending.append(pending)
+                return
+            context = trial.context(request)
+        except FrasError as error:
             pending.fail(error)
             return
-        context = self._context.put(context_of(view, now.tissue, request.request_id))
-        pending.reply(context)
+        pending.reply(self._context.put(context))
 
     def _target(self, request: m.TargetRequest) -> m.TargetReply:
-        if request.trial != self._host.gate.trial:
-            raise OtherTrial(request.trial, self._host.gate.trial)
-        awareness, now = self._known()
-        target = awareness.target(
-            tissue_of(now.tissue),
-            robot_of(now.robot),
-            action=request.action,
-            arm=request.arm,
-            block=request.block,
-        )
-        if target is None:
-            return m.TargetReply(position_m=None)
-        return m.TargetReply(position_m=(float(target[0]), float(target[1]), float(target[2])))
+        self._require_trial(request.trial)
+        return self._trial.target(request)
 
-    def _known(self) -> tuple[Awareness, Moment]:
-        if self._awareness is None or self._now is None:
-            raise NothingKnown("no state of this trial has been seen yet: reset and tick first")
-        return self._awareness, self._now
+    def _require_trial(self, asked: str) -> None:
+        if asked != self._host.gate.trial:
+            raise OtherTrial(asked, self._host.gate.trial)
 
     def wake(self) -> float | None:
-        """Nothing is due by time."""
-        return None
+        """Say in health who has been waited for; nothing else is due by time."""
+        # A question about a tick of which nothing is here waits for motion to begin it.
+        missing = self._trial.missing or ("motion" if self._pending else "")
+        self._host.waiting_for = self._waiting.told(missing, self._clock())
+        return Waiting.period_s if missing else None
 
     def close(self) -> None:
         """Nothing to put in order."""

@@ -1,0 +1,119 @@
+"""One trial as situation awareness sees it: messages in, messages out, no bus."""
+
+from fras_common import messages as m
+from fras_common.scenario import Scenario
+from fras_sa.adapter import (
+    context_of,
+    model_of,
+    parameters_of,
+    robot_of,
+    target_of,
+    tissue_of,
+    verdict_of,
+)
+from fras_sa.awareness import Awareness, AwarenessError, Memory
+from fras_sa.errors import NothingKnown
+from fras_sa.join import Moment, TickJoin
+
+
+class WatchedTrial:
+    """What is known of one trial.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        For its thresholds.
+
+    Attributes
+    ----------
+    verdict : Verdict or None
+        The last one.
+    problem : AwarenessError or None
+        Why the scene can't be watched.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._parameters = parameters_of(scenario.awareness)
+        self._awareness: Awareness | None = None
+        self._memory = Memory()
+        self._join = TickJoin()
+        self._now: Moment | None = None
+        self.verdict: m.Verdict | None = None
+        self.problem: AwarenessError | None = None
+
+    @property
+    def tick(self) -> int:
+        """The last tick judged; -1 before the first."""
+        return self.verdict.tick if self.verdict is not None else -1
+
+    @property
+    def missing(self) -> str:
+        """The service that the next verdict waits for; empty while nothing of it is here."""
+        if self.problem is not None:
+            return ""
+        if self._awareness is None and not self._join.is_empty:
+            return "sim"
+        return self._join.missing
+
+    def see_model(self, model: m.TissueModel) -> None:
+        """Take the scene.
+
+        Raises
+        ------
+        AwarenessError
+            If it can't be watched; kept as `problem`.
+        """
+        try:
+            self._awareness = Awareness(self._parameters, model_of(model))
+        except AwarenessError as error:
+            self.problem = error
+            raise
+
+    def see_state(self, state: m.TissueState | m.RobotState) -> None:
+        """Take a state; one of a tick that has been judged changes nothing."""
+        self._join.add(state)
+
+    def judge_next(self) -> m.Verdict | None:
+        """Judge the next tick as soon as both of its states and the model are here."""
+        if self._awareness is None or (moment := self._join.take()) is None:
+            return None
+        judgement = self._awareness.judge(
+            tissue_of(moment.tissue), robot_of(moment.robot), self._memory
+        )
+        self._memory = judgement.memory
+        self._now = moment
+        self.verdict = verdict_of(judgement, self._parameters, moment.tissue)
+        return self.verdict
+
+    def context(self, request: m.ContextRequest) -> m.Context:
+        """Tell the situation at the last tick judged.
+
+        Raises
+        ------
+        AwarenessError, NothingKnown
+        """
+        if self.problem is not None:
+            raise self.problem
+        awareness, now = self._known()
+        view = awareness.context(tissue_of(now.tissue), robot_of(now.robot), self._memory)
+        return context_of(view, now.tissue, request.request_id)
+
+    def target(self, request: m.TargetRequest) -> m.TargetReply:
+        """Tell where an action is to bring its arm.
+
+        Raises
+        ------
+        AwarenessError, NothingKnown
+        """
+        awareness, now = self._known()
+        tissue, robot = tissue_of(now.tissue), robot_of(now.robot)
+        return target_of(
+            awareness.target(
+                tissue, robot, action=request.action, arm=request.arm, block=request.block
+            )
+        )
+
+    def _known(self) -> tuple[Awareness, Moment]:
+        if self._awareness is None or self._now is None:
+            raise NothingKnown("no state of this trial has been seen yet: reset and tick first")
+        return self._awareness, self._now
