@@ -17,6 +17,7 @@ from fras_common.messages import (
     Context,
     ExecuteReply,
     Fault,
+    Monitored,
     NoPlan,
     Plan,
     PlannedAction,
@@ -76,6 +77,8 @@ class World:
     said: list[Plan | TaskStatus] = field(default_factory=list[Plan | TaskStatus])
     accepted: bool = False
     verified: dict[int, list[str]] = field(default_factory=dict[int, list[str]])
+    expected: list[list[str]] = field(default_factory=list[list[str]])
+    evidence: dict[str, float] = field(default_factory=dict[str, float])
     last: str = ""
     tick: int = 0
 
@@ -167,6 +170,7 @@ class World:
                 blocks_m=[],
                 roi_m=(0.0, 0.0, 0.0),
                 fixed_points_m=[],
+                monitored=self.monitor(request.expected),
             )
         if ask.query is SA_TARGET:
             return TargetReply(position_m=(0.0, 0.0, 0.0))
@@ -182,6 +186,19 @@ class World:
         if ask.query is CANCEL:
             return CancelReply(tick=self.tick)
         return ResetReply(digest=content_digest("t", self.scenario, b""))
+
+    def monitor(self, expected: list[str]) -> list[Monitored]:
+        """Answer as situation awareness does: one entry for each expectation."""
+        self.expected.append(expected)
+        fluents = self.fluents(self.last)
+        return [
+            Monitored(
+                atom=atom,
+                holds=(atom.removeprefix("-") in fluents) != atom.startswith("-"),
+                evidence=self.evidence,
+            )
+            for atom in expected
+        ]
 
 
 def after(**by_action: list[str]) -> Callable[[str], list[str]]:
@@ -309,9 +326,62 @@ def test_effect_that_did_not_come_is_a_deviation() -> None:
 
 
 def test_effect_that_must_not_hold_is_watched_too() -> None:
-    world = World([[RELEASING[0]], []], after(release=["closed_gripper(psm1)"]))
+    world = World(
+        [[RELEASING[0]], []],
+        after(release=["closed_gripper(psm1)"]),
+        evidence={"jaw_rad": 0.1, "closed_jaw_rad": 0.349},
+    )
     world.run()
-    assert world.requests[1].reason.startswith("deviation: -closed_gripper(psm1)")
+    assert world.requests[1].reason == (
+        "deviation: -closed_gripper(psm1) expected after release(psm1); "
+        "jaw 5.7 degrees, needed at least 20.0 degrees"
+    )
+
+
+def test_deviation_tells_the_numbers_behind_it() -> None:
+    world = World(
+        [pulling(), []],
+        after(reach=[f"at(psm1,{BLOCK})"]),
+        evidence={
+            "distance_m": 0.0072,
+            "at_distance_m": 0.005,
+            "jaw_rad": -0.3,
+            "closed_jaw_rad": 0.349,
+        },
+    )
+    world.run()
+    assert world.requests[1].reason == (
+        f"deviation: in_hand(psm1,{BLOCK}) expected after grasp(psm1,{BLOCK}); "
+        "distance 7.2 mm, needed below 5.0 mm; jaw -17.2 degrees, needed below 20.0 degrees"
+    )
+
+
+def test_situation_awareness_is_asked_what_the_last_action_should_have_brought() -> None:
+    world = World(
+        [pulling(), pulling(OTHER), []],
+        held,
+        ends={f"grasp(psm1,{BLOCK})": ("failed", "nothing_in_reach")},
+        refuse={f"reach(psm1,{OTHER})": "no way"},
+    )
+    world.run()
+    assert world.expected == [
+        [],  # before anything was done
+        [f"at(psm1,{BLOCK})"],
+        [f"in_hand(psm1,{BLOCK})"],  # also of what failed
+        [],  # not of what was refused
+    ]
+
+
+def test_expectation_that_nobody_looked_at_is_a_deviation() -> None:
+    class Blind(World):
+        def monitor(self, expected: list[str]) -> list[Monitored]:
+            return []
+
+    world = Blind([pulling(), []], EXPOSED)
+    world.run()
+    assert world.requests[1].reason == (
+        f"deviation: at(psm1,{BLOCK}) expected after reach(psm1,{BLOCK})"
+    )
 
 
 def test_lifted_stop_is_planned_anew_and_no_failure() -> None:

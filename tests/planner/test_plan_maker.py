@@ -20,6 +20,7 @@ CONTEXT = Context(
     blocks_m=[(0.02, 0.02, 0.005), (0.02, 0.04, 0.005)],
     roi_m=(0.02, 0.04, 0.0),
     fixed_points_m=[],
+    monitored=[],
 )
 REQUEST = PlanRequest(request_id="c1", reason="initial", ignore_ap=False, tried=())
 

@@ -162,8 +162,9 @@ def test_evidence_of_what_was_not_sensed_is_not_told(planner: Planner) -> None:
         ),
         ("slipped", "Planned anew: slipped."),
         (
-            "deviation: in_hand(psm1,b(1,1)) expected after grasp(psm1,b(1,1))",
-            "Planned anew: deviation, in_hand(psm1,b(1,1)) expected after grasp(psm1,b(1,1)).",
+            "deviation: in_hand(psm1,b(1,1)) expected after grasp(psm1,b(1,1)); distance 7.2 mm",
+            "Planned anew: deviation, in_hand(psm1,b(1,1)) expected after grasp(psm1,b(1,1)); "
+            "distance 7.2 mm.",
         ),
         # Whatever a service says stands there as it was said, and is no rule.
         (

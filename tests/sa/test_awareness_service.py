@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import msgspec
+import numpy as np
 import pytest
 
 from fras_common.bus import RemoteFault
@@ -54,6 +55,11 @@ class Bench(ShellBench):
         self.tissue.put(tissue(number, **options))
         self.robot.put(robot(number))
         self.settle()
+
+
+def asking(min_tick: int, *expected: str, **options: Any) -> ContextRequest:
+    fields: dict[str, Any] = {"trial": "t", "request_id": "c1", **options}
+    return ContextRequest(min_tick=min_tick, expected=list(expected), **fields)
 
 
 @pytest.fixture
@@ -138,7 +144,7 @@ def test_levels_reach_the_wire(bench: Bench) -> None:
 def test_context_is_answered_when_its_tick_is_there(bench: Bench) -> None:
     bench.reset()
     bench.tick(0)
-    waiting = bench.ask(SA_CONTEXT, ContextRequest(trial="t", request_id="c1", min_tick=1))
+    waiting = bench.ask(SA_CONTEXT, asking(1))
     assert waiting == []
     bench.tick(1)
     (context,) = waiting
@@ -150,7 +156,7 @@ def test_context_is_answered_when_its_tick_is_there(bench: Bench) -> None:
 
 def test_context_of_a_trial_that_ended_is_a_typed_fault(bench: Bench) -> None:
     bench.reset()
-    waiting = bench.ask(SA_CONTEXT, ContextRequest(trial="t", request_id="c1", min_tick=9))
+    waiting = bench.ask(SA_CONTEXT, asking(9))
     bench.reset("t2")
     assert isinstance(waiting[0], RemoteFault)
     assert waiting[0].remote_kind == "NothingKnown"
@@ -184,10 +190,10 @@ def test_targets(bench: Bench) -> None:
 def test_scene_that_cannot_be_watched_is_answered_not_waited_for(bench: Bench) -> None:
     far = SceneSection(roi_m=(0.05, 0.06, 0.0))
     bench.ask(SA_RESET, ResetRequest(trial="t", scenario=Scenario(scene=far)))
-    waiting = bench.ask(SA_CONTEXT, ContextRequest(trial="t", request_id="c1", min_tick=0))
+    waiting = bench.ask(SA_CONTEXT, asking(0))
     bench.model.put(msgspec.structs.replace(MODEL, roi_m=(0.9, 0.9, 0.9), trial="t"))
     bench.settle()
-    later = bench.ask(SA_CONTEXT, ContextRequest(trial="t", request_id="c2", min_tick=0))
+    later = bench.ask(SA_CONTEXT, asking(0, request_id="c2"))
     assert [answers[0].remote_kind for answers in (waiting, later)] == ["NoTissueNearRoi"] * 2
     assert bench.host.counts["refused"] == 1
 
@@ -195,7 +201,7 @@ def test_scene_that_cannot_be_watched_is_answered_not_waited_for(bench: Bench) -
 def test_question_about_another_trial_is_refused(bench: Bench) -> None:
     bench.reset()
     bench.tick(0)
-    (context,) = bench.ask(SA_CONTEXT, ContextRequest(trial="old", request_id="c", min_tick=0))
+    (context,) = bench.ask(SA_CONTEXT, asking(0, trial="old"))
     asked = TargetRequest(trial="old", action="reach", arm="psm1", block="b(4,4)")
     (target,) = bench.ask(SA_TARGET, asked)
     assert context.remote_kind == target.remote_kind == "OtherTrial"
@@ -258,7 +264,7 @@ def test_health_says_that_the_model_is_missing(bench: Bench) -> None:
 def test_question_about_a_tick_to_come_waits_for_motion(bench: Bench) -> None:
     bench.reset()
     bench.tick(0)
-    bench.ask(SA_CONTEXT, ContextRequest(trial="t", request_id="c1", min_tick=1))
+    bench.ask(SA_CONTEXT, asking(1))
     assert states_over(bench, 0.6)[1] == "waiting: motion"
 
 
@@ -272,3 +278,17 @@ def test_moments_of_waiting_one_after_the_other_are_not_added_up(bench: Bench) -
         assert "waiting" not in bench.host.state
         bench.tissue.put(tissue(tick))
         bench.settle()
+
+
+def test_context_says_what_became_of_the_expectations(bench: Bench) -> None:
+    bench.reset()
+    bench.tick(0)
+    (context,) = bench.ask(SA_CONTEXT, asking(0, "at(psm1,b(4,4))", "-closed_gripper(psm2)"))
+    there, opened = context.monitored
+    assert (there.atom, there.holds) == ("at(psm1,b(4,4))", False)
+    assert there.evidence["distance_m"] == pytest.approx(np.hypot(0.03, 0.055), abs=1e-6)
+    assert (opened.atom, opened.holds) == ("-closed_gripper(psm2)", True)
+    assert opened.evidence == pytest.approx({"jaw_rad": np.radians(60), "closed_jaw_rad": 0.349066})
+    (unknown,) = bench.ask(SA_CONTEXT, asking(0, "at(psm1,b(9,9))"))
+    assert unknown.remote_kind == "UnknownAtom"
+    assert "'at(psm1,b(9,9))'" in str(unknown)

@@ -5,7 +5,7 @@ the goal is reached is knowledge and stands in `asp/`; here stands only the orde
 the bookkeeping of section "Pull, move, re-plan": which blocks have been tried.
 """
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -46,6 +46,7 @@ from fras_common.topics import (
     SA_TARGET,
     SIM_RESET,
 )
+from fras_planner.deviation import first_deviation
 from fras_planner.effects import Accept, Ask, AwaitResult, Effect, Say
 from fras_planner.tried import Held, newly_tried
 
@@ -78,7 +79,7 @@ class Ended:
 
 
 def reason_to_replan(ended: Ended) -> str:
-    """Hold an action's end against what the rules expected; a reason to plan anew, or nothing."""
+    """Return why an action's end asks for a new plan, or nothing."""
     result = ended.result
     if result is None:
         return f"refused: {ended.refusal}"
@@ -86,12 +87,7 @@ def reason_to_replan(ended: Ended) -> str:
         return "hold" if result.reason == "hold" else "force"
     if result.outcome == "failed":
         return result.reason
-    holds = set(ended.context.fluents)
-    for expected in ended.action.expected:
-        wanted = not expected.startswith("-")
-        if (expected.removeprefix("-") in holds) != wanted:
-            return f"deviation: {expected} expected after {ended.action.text}"
-    return ""
+    return first_deviation(ended.action, ended.context.monitored)
 
 
 class TaskAborted(FrasError):
@@ -276,12 +272,13 @@ class Executive:
                     reason = deviation
                     break
 
-    def _context(self) -> Steps:
+    def _context(self, expected: Sequence[str] = ()) -> Steps:
         self._contexts += 1
         request = ContextRequest(
             trial=self._request.trial,
             request_id=f"c{self._contexts}",
             min_tick=self._last_tick,
+            expected=list(expected),
         )
         context: Context = yield Ask(SA_CONTEXT, request, self._timeout_s)
         return context
@@ -342,7 +339,7 @@ class Executive:
         if result.outcome == "aborted":
             # Its last tick may never be judged; nothing is asked about it.
             raise ActionAborted(result.reason)
-        context = yield from self._context()
+        context = yield from self._context(action.expected)
         return Ended(action, result, "", context)
 
     def _remember(self, ended: Ended, ignored_ap: bool) -> None:

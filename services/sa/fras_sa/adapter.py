@@ -97,6 +97,10 @@ def context_of(view: ContextView, state: m.TissueState, request_id: str) -> m.Co
         blocks_m=[(float(x), float(y), float(z)) for x, y, z in view.blocks_m],
         roi_m=(float(roi[0]), float(roi[1]), float(roi[2])),
         fixed_points_m=[(float(x), float(y), float(z)) for x, y, z in view.fixed_points_m],
+        monitored=[
+            m.Monitored(atom=one.atom, holds=one.holds, evidence=one.evidence)
+            for one in view.monitored
+        ],
     )
 
 

@@ -95,7 +95,8 @@ class WatchedTrial:
         if self.problem is not None:
             raise self.problem
         awareness, now = self._known()
-        view = awareness.context(tissue_of(now.tissue), robot_of(now.robot), self._memory)
+        tissue, robot = tissue_of(now.tissue), robot_of(now.robot)
+        view = awareness.context(tissue, robot, self._memory, request.expected)
         return context_of(view, now.tissue, request.request_id)
 
     def target(self, request: m.TargetRequest) -> m.TargetReply:

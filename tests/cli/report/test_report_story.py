@@ -123,6 +123,12 @@ def test_changes_name_target_arm_and_what_is_ruled_out(
             "after grasp(psm1,b(1,1)), in_hand(psm1,b(1,1)) does not hold, against expectation",
         ),
         (
+            "deviation: at(psm1,b(1,1)) expected after reach(psm1,b(1,1)); distance 7.2 mm, "
+            "needed below 5.0 mm",
+            "after reach(psm1,b(1,1)), at(psm1,b(1,1)) does not hold, against expectation "
+            "(distance 7.2 mm, needed below 5.0 mm)",
+        ),
+        (
             "deviation: -closed_gripper(psm1) expected after release(psm1)",
             "after release(psm1), closed_gripper(psm1) still holds, against expectation",
         ),

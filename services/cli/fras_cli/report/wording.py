@@ -68,10 +68,14 @@ def reason_in_words(reason: str) -> str:
     rest = rest.strip()
     match head if colon else "":
         case "deviation":
-            fluent, _, action = rest.partition(" expected after ")
+            fluent, _, rest = rest.partition(" expected after ")
+            action, _, numbers = rest.partition("; ")
             negative = fluent.startswith("-")
             found = "still holds" if negative else "does not hold"
-            return f"after {action}, {fluent.removeprefix('-')} {found}, against expectation"
+            measured = f" ({numbers})" if numbers else ""
+            return (
+                f"after {action}, {fluent.removeprefix('-')} {found}, against expectation{measured}"
+            )
         case "refused":
             return f"the motion service refused: {rest}"
         case "hold":

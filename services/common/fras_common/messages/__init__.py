@@ -47,7 +47,14 @@ from fras_common.messages.recorder import (
     RecorderStatus,
 )
 from fras_common.messages.robot import ActionState, ArmState, RobotState
-from fras_common.messages.sa import Context, ContextRequest, TargetReply, TargetRequest, Verdict
+from fras_common.messages.sa import (
+    Context,
+    ContextRequest,
+    Monitored,
+    TargetReply,
+    TargetRequest,
+    Verdict,
+)
 from fras_common.messages.service import (
     Fault,
     FaultRecord,
@@ -92,6 +99,7 @@ __all__ = [
     "LastReply",
     "LastRequest",
     "LogRecord",
+    "Monitored",
     "NoPlan",
     "OpenRequest",
     "OperatingState",

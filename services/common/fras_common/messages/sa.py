@@ -45,11 +45,26 @@ class Verdict(Header, frozen=True, kw_only=True):
 
 
 class ContextRequest(Wire, frozen=True, kw_only=True):
-    """Ask for the context as soon as SA has seen `min_tick`."""
+    """Ask for the context as soon as SA has seen `min_tick`.
+
+    Attributes
+    ----------
+    expected : list of atoms
+        What must hold after the action just done (a leading - means: must not), for `monitored`.
+    """
 
     trial: str
     request_id: str
     min_tick: int
+    expected: list[str]
+
+
+class Monitored(Wire, frozen=True, kw_only=True):
+    """Whether one expected `atom` (as asked) is as expected, and the numbers behind it."""
+
+    atom: str
+    holds: bool
+    evidence: Evidence
 
 
 class Context(Header, frozen=True, kw_only=True):
@@ -62,6 +77,7 @@ class Context(Header, frozen=True, kw_only=True):
     blocks_m: list[Vec3]
     roi_m: Vec3
     fixed_points_m: list[Vec3]
+    monitored: list[Monitored]
 
 
 class TargetRequest(Wire, frozen=True, kw_only=True):

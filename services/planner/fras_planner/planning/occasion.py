@@ -1,5 +1,6 @@
 """What a plan is made for, as facts: the reason, and the numbers behind what was sensed."""
 
+import math
 from collections.abc import Container, Mapping
 
 from fras_planner.planning.signature import normalised
@@ -44,7 +45,9 @@ def spoken(name: str, value: float) -> str:
     if name.endswith("_n"):
         return f"{value:.2f} N"
     if name.endswith("_m"):
-        return f"{1e3 * value:.0f} mm"
+        return f"{1e3 * value:.1f} mm"
+    if name.endswith("_rad"):
+        return f"{math.degrees(value):.1f} degrees"
     return f"{value:.3g}"
 
 

@@ -12,10 +12,12 @@ from .errors import (
     MalformedModel,
     NoBlocks,
     NoTissueNearRoi,
+    UnknownAtom,
     UnknownName,
     UnusableState,
 )
 from .memory import Memory
+from .monitor import Monitored
 from .parameters import AwarenessParameters
 from .trend import Trend
 from .views import (
@@ -48,12 +50,14 @@ __all__ = [
     "Level",
     "MalformedModel",
     "Memory",
+    "Monitored",
     "NoBlocks",
     "NoTissueNearRoi",
     "RobotView",
     "TissueModel",
     "TissueView",
     "Trend",
+    "UnknownAtom",
     "UnknownName",
     "UnusableState",
     "make_blocks",

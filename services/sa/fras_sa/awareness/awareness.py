@@ -5,6 +5,7 @@ must be kept from tick to tick is the `Memory` that goes in and comes out.
 """
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +23,7 @@ from .failure import (
     tissue_problem,
 )
 from .memory import Memory, remember
+from .monitor import Monitored, Situation, monitor
 from .parameters import AwarenessParameters
 from .target import compute_target
 from .views import Evidence, FloatArray, Level, RobotView, TissueModel, TissueView
@@ -85,6 +87,8 @@ class ContextView:
         The ROI.
     fixed_points_m : ndarray, shape (n_fixed, 3), float64 [m]
         The attachment points.
+    monitored : tuple of Monitored
+        What became of the expectations asked about.
     """
 
     fluents: tuple[str, ...]
@@ -93,6 +97,7 @@ class ContextView:
     blocks_m: NDArray[np.float64]
     roi_m: NDArray[np.float64]
     fixed_points_m: NDArray[np.float64]
+    monitored: tuple[Monitored, ...]
 
 
 class Awareness:
@@ -119,7 +124,7 @@ class Awareness:
         _check(model)
         self._parameters = parameters
         self._n_nodes = len(model.nodes_m)
-        self._dt_s = model.dt_s
+        self._model = model
         self._roi_m = np.array(model.roi_m, dtype=np.float64)
         self._fixed_points_m = np.array(model.fixed_points_m, dtype=np.float64)
         # Every context hands these two out again.
@@ -160,7 +165,7 @@ class Awareness:
         if valid or not tissue_problem(tissue, self._n_nodes):
             visibility = self._close.visible_fraction(tissue.nodes_m)
         visible = visibility > parameters.visible_fraction
-        trend = last.after(tissue.tick, failure.force_n if valid else None, self._dt_s)
+        trend = last.after(tissue.tick, failure.force_n if valid else None, self._model.dt_s)
         memory = remember(memory, parameters, robot, failure.level, visible=visible, trend=trend)
         return Judgement(
             level=failure.level,
@@ -172,11 +177,17 @@ class Awareness:
             visible=visible,
             max_height=tuple(sorted(memory.max_height)),
             rate_n_s=trend.rate_n_s,
-            crossing_tick=trend.crossing_tick(binding_limit(parameters, robot), self._dt_s),
+            crossing_tick=trend.crossing_tick(binding_limit(parameters, robot), self._model.dt_s),
             memory=memory,
         )
 
-    def context(self, tissue: TissueView, robot: RobotView, memory: Memory) -> ContextView:
+    def context(
+        self,
+        tissue: TissueView,
+        robot: RobotView,
+        memory: Memory,
+        expected: Iterable[str] = (),
+    ) -> ContextView:
         """Return the fluents that hold, with their evidence.
 
         Parameters
@@ -185,6 +196,8 @@ class Awareness:
             Both of the same tick.
         memory : Memory
             After that tick's judgement.
+        expected : iterable of str
+            Fluents that the last action should have brought; a leading `-`: ended.
 
         Returns
         -------
@@ -195,6 +208,8 @@ class Awareness:
         UnusableState
             If a position, force or angle is not finite, an arm is missing, or the ticks differ:
             a fluent left out would be told false.
+        UnknownAtom
+            If a fluent, arm or block expected does not exist.
         """
         self._require_usable(tissue, robot)
         parameters = self._parameters
@@ -208,6 +223,16 @@ class Awareness:
         holding |= fl.max_height_fluents(memory.max_height, visibility, force)
         holding |= fl.location_fluents(parameters, self._blocks, tissue.nodes_m, robot)
         holding |= {text: dict(evidence) for text, evidence in self._scene.items()}
+        situation = Situation(
+            parameters,
+            self._blocks,
+            self._model,
+            tissue,
+            robot,
+            holding,
+            visibility=visibility,
+            force=force,
+        )
         return ContextView(
             fluents=tuple(holding),
             evidence=holding | {"visible_roi": visibility, "force": force},
@@ -215,6 +240,7 @@ class Awareness:
             blocks_m=self._blocks.rest_m,
             roi_m=self._roi_m,
             fixed_points_m=self._fixed_points_m,
+            monitored=monitor(expected, situation),
         )
 
     def target(

@@ -68,11 +68,30 @@ class UnusableState(AwarenessError):
         )
 
 
+class UnknownAtom(AwarenessError):
+    """An expectation about a fluent, arm or block that the scene does not have."""
+
+    def __init__(self, atom: str, sort: str, name: str, known: Sequence[str]) -> None:
+        super().__init__(
+            f"{atom!r} can't be monitored: unknown {sort} {name!r}; known: {_some(known)}",
+            atom=atom,
+            sort=sort,
+            name=name,
+            known=tuple(known),
+        )
+
+
 class UnknownName(AwarenessError):
     """An action, arm or block that the scene does not have."""
 
     def __init__(self, sort: str, name: str, known: Sequence[str]) -> None:
-        shown = ", ".join(known[:8]) + (", ..." if len(known) > 8 else "")
         super().__init__(
-            f"unknown {sort} {name!r}; known: {shown}", sort=sort, name=name, known=tuple(known)
+            f"unknown {sort} {name!r}; known: {_some(known)}",
+            sort=sort,
+            name=name,
+            known=tuple(known),
         )
+
+
+def _some(names: Sequence[str]) -> str:
+    return ", ".join(names[:8]) + (", ..." if len(names) > 8 else "")

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from .blocks import Blocks
 from .parameters import AwarenessParameters
-from .views import ARMS, Evidence, FloatArray, RobotView, TissueModel
+from .views import ARMS, ArmView, Evidence, FloatArray, RobotView, TissueModel
 
 SIDE_TOLERANCE_M = 1e-9
 """A block on the tissue's middle line belongs to psm2, whatever its rounding."""
@@ -46,30 +46,21 @@ def scene_fluents(blocks: Blocks, model: TissueModel) -> Fluents:
     roi = np.asarray(model.roi_m, dtype=np.float64)
     for row in blocks.rows_at(roi[None]):
         if row >= 0:
-            offset = roi[:2] - blocks.rest_m[row, :2]
-            fluents[f"above_roi({blocks.names[row]})"] = {
-                "roi_offset_x_m": float(offset[0]),
-                "roi_offset_y_m": float(offset[1]),
-                "half_cell_x_m": float(0.5 * blocks.cell_m[0]),
-                "half_cell_y_m": float(0.5 * blocks.cell_m[1]),
-            }
-    middle = blocks.middle_y_m
-    for name, y in zip(blocks.names, blocks.rest_m[:, 1], strict=True):
-        arm = ARMS[0] if y < middle - SIDE_TOLERANCE_M else ARMS[1]
-        fluents[f"reachable({arm},{name})"] = {"rest_y_m": float(y), "middle_y_m": middle}
+            fluents[f"above_roi({blocks.names[row]})"] = above_roi_evidence(blocks, row, roi)
+    for row, name in enumerate(blocks.names):
+        evidence = reachable_evidence(blocks, row)
+        lower = evidence["rest_y_m"] < evidence["middle_y_m"] - SIDE_TOLERANCE_M
+        fluents[f"reachable({ARMS[0] if lower else ARMS[1]},{name})"] = evidence
     rows = blocks.rows_at(model.fixed_points_m)
     for row, count in zip(*np.unique(rows[rows >= 0], return_counts=True), strict=True):
-        fluents[f"fixed({blocks.names[row]})"] = {"fixed_points": float(count)}
+        fluents[f"fixed({blocks.names[row]})"] = fixed_evidence(count)
     return fluents
 
 
 def gripper_fluents(parameters: AwarenessParameters, robot: RobotView) -> Fluents:
     """Return which grippers are closed."""
     return {
-        f"closed_gripper({name})": {
-            "jaw_rad": arm.jaw_rad,
-            "closed_jaw_rad": parameters.closed_jaw_rad,
-        }
+        f"closed_gripper({name})": jaw_evidence(parameters, arm)
         for name, arm in sorted(robot.arms.items())
         if arm.jaw_rad < parameters.closed_jaw_rad
     }
@@ -86,31 +77,59 @@ def location_fluents(
     current = blocks.current(nodes_m)
     fluents: Fluents = {}
     for name, arm in sorted(robot.arms.items()):
-        distances = _distances(current, arm.tip_m)
-        for row in np.flatnonzero(distances < parameters.at_distance_m):
-            evidence: Evidence = {
-                "distance_m": float(distances[row]),
-                "at_distance_m": parameters.at_distance_m,
-            }
+        apart = distances(current, arm.tip_m)
+        for row in np.flatnonzero(apart < parameters.at_distance_m):
+            evidence = distance_evidence(parameters, apart[row])
             fluents[f"at({name},{blocks.names[row]})"] = evidence
             if arm.jaw_rad < parameters.closed_jaw_rad:
-                fluents[f"in_hand({name},{blocks.names[row]})"] = evidence | {
-                    "jaw_rad": arm.jaw_rad,
-                    "closed_jaw_rad": parameters.closed_jaw_rad,
-                }
+                grip = evidence | jaw_evidence(parameters, arm)
+                fluents[f"in_hand({name},{blocks.names[row]})"] = grip
     return fluents
 
 
 def max_height_fluents(arms: Iterable[str], visibility: Evidence, force: Evidence) -> Fluents:
     """Return which arms may not pull on, with what is seen and borne now."""
+    return {f"max_height({arm})": max_height_evidence(visibility, force) for arm in sorted(arms)}
+
+
+def above_roi_evidence(blocks: Blocks, row: int, roi_m: FloatArray) -> Evidence:
+    """Return where the ROI lies, seen from a block's centre, and how far the block goes."""
+    offset = roi_m[:2] - blocks.rest_m[row, :2]
     return {
-        f"max_height({arm})": {
-            "visible_fraction": visibility["visible_fraction"],
-            "threshold_fraction": visibility["threshold_fraction"],
-            "force_n": force["force_n"],
-            "limit_n": force["limit_n"],
-        }
-        for arm in sorted(arms)
+        "roi_offset_x_m": float(offset[0]),
+        "roi_offset_y_m": float(offset[1]),
+        "half_cell_x_m": float(0.5 * blocks.cell_m[0]),
+        "half_cell_y_m": float(0.5 * blocks.cell_m[1]),
+    }
+
+
+def reachable_evidence(blocks: Blocks, row: int) -> Evidence:
+    """Return on which side of the tissue a block lies."""
+    return {"rest_y_m": float(blocks.rest_m[row, 1]), "middle_y_m": blocks.middle_y_m}
+
+
+def fixed_evidence(points: int) -> Evidence:
+    """Return how many attachment points lie in a block."""
+    return {"fixed_points": float(points)}
+
+
+def jaw_evidence(parameters: AwarenessParameters, arm: ArmView) -> Evidence:
+    """Return a jaw's opening, and below which it is closed."""
+    return {"jaw_rad": arm.jaw_rad, "closed_jaw_rad": parameters.closed_jaw_rad}
+
+
+def distance_evidence(parameters: AwarenessParameters, distance_m: float) -> Evidence:
+    """Return how far a tip is from a block, and nearer than what it is at it."""
+    return {"distance_m": float(distance_m), "at_distance_m": parameters.at_distance_m}
+
+
+def max_height_evidence(visibility: Evidence, force: Evidence) -> Evidence:
+    """Return what is seen and borne now."""
+    return {
+        "visible_fraction": visibility["visible_fraction"],
+        "threshold_fraction": visibility["threshold_fraction"],
+        "force_n": force["force_n"],
+        "limit_n": force["limit_n"],
     }
 
 
@@ -136,6 +155,7 @@ def force_evidence(parameters: AwarenessParameters, force_n: float) -> Evidence:
     }
 
 
-def _distances(points: NDArray[np.float64], tip: FloatArray) -> NDArray[np.float64]:
+def distances(points: NDArray[np.float64], tip: FloatArray) -> NDArray[np.float64]:
+    """Return how far each point is from the tip [m]."""
     offset = points - tip
     return np.sqrt((offset * offset).sum(axis=1))
