@@ -4,9 +4,11 @@ Nothing is shared with the fast implementation but the inputs. Where the listing
 (what a tissue point is, what is in a block) it takes the design's.
 """
 
+import itertools
 import math
 import statistics
 import time
+from typing import Any
 
 import numpy as np
 import pytest
@@ -115,11 +117,59 @@ def compute_fluents(scene, nodes, arms, max_height, n):
     return F
 
 
-def check_failure(force, action):
-    """Algorithm 1, lines 8-9, with the design's hard limit."""
-    if force > 1.0:
+def check_failure(limits, tissue, action):
+    """Algorithm 1, lines 8-9, with the design's hard limit, on every tick and action."""
+    if not tissue.converged:
+        return "invalid"
+    force = tissue.max_force_n
+    if limits["force_metric"] == "tool":
+        force = 0.0
+        for x, y, z in tissue.tool_force_n.values():
+            force = max(force, math.sqrt(x * x + y * y + z * z))
+    if limits["no_limit"]:
+        return "ok"
+    if force > limits["hard_limit_n"]:
         return "hard"
-    return "soft" if action is not None and action.name == "pull" and force > 0.5 else "ok"
+    pulling = action is not None and action.name == "pull"
+    return "soft" if pulling and force > limits["force_limit_n"] else "ok"
+
+
+def max_heights(history):
+    """The arms that may not pull on, from everything that happened: design, section 5.
+
+    Set by a soft crossing, a hard one with tissue in the jaws, or the height reached unexposed;
+    the arm's next move or release clears it, in its first tick.
+    """
+    found = set()
+    for arm in ("psm1", "psm2"):
+        may_not = False
+        for k, (action, level, seen, jaw) in enumerate(history):
+            if action is None or action.arm != arm:
+                continue
+            before = history[k - 1][0] if k > 0 else None
+            goes_on = (
+                before is not None
+                and (before.name, before.arm) == (action.name, action.arm)
+                and before.phase not in ("done", "interrupted")
+            )
+            if action.name in ("move", "release") and not goes_on:
+                may_not = False
+            if level == "soft":
+                may_not = True
+            if level == "hard" and action.name != "release" and jaw < math.radians(20):
+                may_not = True
+            if action.name == "pull" and action.phase == "done" and level != "invalid" and not seen:
+                may_not = True
+        if may_not:
+            found.add(arm)
+    return found
+
+
+def compute_target(name, now, centre, tip):
+    """Algorithm 1, compute_target: (x_B, y_B, z_B) for reach, (x_B, y_B, z_i) for move."""
+    if name == "reach":
+        return now
+    return [*centre, tip[2]] if name == "move" else None
 
 
 def random_scene(rng, box):
@@ -129,7 +179,30 @@ def random_scene(rng, box):
         (x * 0.0025, y * 0.0025, 0.0) for x in range(41) for y in range(49) if rng.random() < 0.01
     ]
     roi = (rng.uniform(0.015, 0.085), rng.uniform(0.015, 0.105), -rng.uniform(0, 0.004))
-    return n, box(counts, roi=roi, fixed=raster, flip=bool(rng.random() < 0.5))
+    soft = float(rng.uniform(0.2, 0.8))
+    limits: dict[str, Any] = {
+        "force_limit_n": soft,
+        "hard_limit_n": soft * float(rng.uniform(1.0, 2.0)),
+        "force_metric": ("nodal_max", "tool")[rng.integers(2)],
+        "no_limit": bool(rng.random() < 0.1),
+    }
+    return n, box(counts, roi=roi, fixed=raster, flip=bool(rng.random() < 0.5)), limits
+
+
+def random_actions(rng, ticks):
+    """Actions as `robot/state` shows them: some end, some are cut off, some ticks have none."""
+    actions = []
+    while len(actions) < ticks:
+        if rng.random() < 0.2:
+            actions.append(None)
+            continue
+        name = ("reach", "grasp", "release", "pull", "move")[rng.integers(5)]
+        arm = ("psm1", "psm2")[rng.integers(2)]
+        phases = ["go"] * int(rng.integers(0, 4))
+        if rng.random() < 0.8:
+            phases.append(("done", "interrupted")[rng.integers(2)])
+        actions += [ActionView(name, arm, "b(1,1)", phase) for phase in phases]
+    return actions[:ticks]
 
 
 def random_state(rng, model, n):
@@ -151,36 +224,56 @@ def random_state(rng, model, n):
         step = rng.normal(size=3)
         step *= rng.uniform(0, 0.01) / np.linalg.norm(step)
         arms[name] = (np.array(near) + step, float(rng.uniform(-0.3, 1.0)))
-    name = ("reach", "grasp", "release", "pull", "move", None)[rng.integers(6)]
-    action = None if name is None else ActionView(name, "psm1", "b(1,1)", "lift")
-    return nodes, arms, action, float(rng.uniform(0, 1.4))
+    return nodes, arms
+
+
+def random_tissue(rng, tick, nodes):
+    tools = {arm: rng.normal(0, 0.4, 3) for arm in ("psm1", "psm2") if rng.random() < 0.7}
+    force = float(rng.uniform(0, 1.4))
+    return TissueView(tick, nodes, force, tools, converged=bool(rng.random() < 0.9))
 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_fast_and_slow_agree_on_random_states(box, seed):
     rng = np.random.default_rng(seed)
-    n, model = random_scene(rng, box)
-    sa = Awareness(AwarenessParameters(blocks=n), model)
+    n, model, limits = random_scene(rng, box)
+    sa = Awareness(AwarenessParameters(blocks=n, **limits), model)
     rest, triangles = model.nodes_m.tolist(), model.triangles.tolist()
     roi = model.roi_m.tolist()
     p_close = compute_p_close(rest, triangles, roi)
     scene = (rest, triangles, model.fixed_points_m.tolist(), roi, p_close)
-    kinds = set()
-    for _ in range(50):
-        nodes, arms, action, force = random_state(rng, model, n)
-        max_height = {name for name in arms if rng.random() < 0.3}
-        tissue = TissueView(0, nodes, force, {}, converged=True)
-        robot = RobotView(0, {k: ArmView(*v) for k, v in arms.items()}, action)
-        verdict = sa.judge(tissue, robot, Memory())
-        assert verdict.level == check_failure(force, action)
-        assert verdict.visibility == pytest.approx(visible(p_close, nodes.tolist(), roi), abs=1e-9)
-        context = sa.context(tissue, robot, Memory(frozenset(max_height)))
+    kinds, history, memory = set(), [], Memory()
+    for tick, action in enumerate(random_actions(rng, 50)):
+        nodes, arms = random_state(rng, model, n)
+        tissue = random_tissue(rng, tick, nodes)
+        robot = RobotView(tick, {k: ArmView(*v) for k, v in arms.items()}, action)
+        verdict = sa.judge(tissue, robot, memory)
+        level = check_failure(limits, tissue, action)
+        seen = visible(p_close, nodes.tolist(), roi)
+        assert verdict.level == level
+        assert verdict.visibility == pytest.approx(seen, abs=1e-9)
+        history.append((action, level, seen > 0.7, arms[action.arm][1] if action else 0.0))
+        max_height = max_heights(history)
+        assert set(verdict.max_height) == max_height
+        memory = verdict.memory
+
+        context = sa.context(tissue, robot, memory)
         expected = compute_fluents(scene, nodes.tolist(), arms, max_height, n)
         assert set(context.fluents) == expected
         assert len(context.fluents) == len(expected)
         assert set(context.evidence) == expected | {"visible_roi", "force"}
-        kinds |= {fluent.split("(")[0] for fluent in expected}
-    assert kinds >= {"at", "in_hand", "closed_gripper", "max_height", "above_roi", "reachable"}
+        kinds |= {fluent.split("(")[0] for fluent in expected} | {level}
+
+        i, j = (int(k) for k in rng.integers(1, n + 1, 2))
+        centre = (i - 0.5) * LX / n, (j - 0.5) * LY / n
+        now = block_now(rest, nodes.tolist(), triangles, *centre)
+        for name, arm in itertools.product(("reach", "grasp", "release", "pull", "move"), arms):
+            target = sa.target(tissue, robot, action=name, arm=arm, block=f"b({i},{j})")
+            wanted = compute_target(name, now, centre, arms[arm][0])
+            assert (target is None) == (wanted is None)
+            assert target is None or target == pytest.approx(wanted, abs=1e-9)
+    assert kinds >= {"at", "in_hand", "closed_gripper", "above_roi", "reachable", "ok", "invalid"}
+    assert limits["no_limit"] or kinds >= {"max_height", "hard"}
 
 
 def test_a_verdict_takes_a_millisecond_at_most_and_a_context_three(box, record_property):
