@@ -57,6 +57,7 @@ bench: $(VENV)/.installed-dev ## measure; figures belong into docs/benchmarks.md
 	$(BIN)/fras bench mesh
 	$(BIN)/fras bench planner
 	$(BIN)/fras bench criteria
+	$(BIN)/fras bench awareness
 	$(BIN)/fras bench motion
 
 clean: ## remove what was built; runs/ stays

@@ -17,6 +17,10 @@ BENCHMARKS: dict[str, tuple[str, str]] = {
     "stress": ("fras_sim.stress", "10,000 steps that try to break the tissue."),
     "planner": ("benchmarks.planner", "The planner against the paper's way with clingo, by grid."),
     "criteria": ("benchmarks.criteria", "Where each criterion grasps, over 400 scenes."),
+    "awareness": (
+        "benchmarks.awareness",
+        "What a verdict and a context cost, how well a crossing is foretold.",
+    ),
     "motion": ("benchmarks.motion", "The arms against their limits, their stops and their reach."),
     "loop": ("benchmarks.loop", "A tick of all services against three raw Zenoh hops."),
 }
