@@ -114,7 +114,9 @@ def test_what_is_no_context_is_refused_with_its_place(text: str | bytes, says: s
 
 def test_a_recorded_message_is_a_context() -> None:
     seen = {"visible_fraction": 0.25, "threshold_fraction": 0.7}
+    monitored = [{"atom": "at(psm1,b(1,2))", "holds": False, "evidence": {"distance_m": 0.02}}]
     recorded = {**CONTEXT, "tick": 3, "trial": "t", "evidence": {"visible_roi": seen}}
+    recorded["monitored"] = monitored
     contexts, _ = read_contexts(json.dumps(recorded), "here.json")
     assert contexts[0].names == ("b(1,1)", "b(1,2)")
     rows, _ = planned({**recorded, "reason": "exposure"})

@@ -31,6 +31,10 @@ def test_a_pull_exposes_below_the_limit(trials: Any) -> None:
     plans: list[Plan] = messages(log, "planner/plan")
     assert [len(plan.actions) for plan in plans] == [3, 0]
     assert plans[0].explanation
+    contexts: list[Context] = messages(log, "sa/context")
+    monitored = [[one.atom for one in context.monitored] for context in contexts]
+    assert monitored == [[], *(action.expected for action in plans[0].actions)]
+    assert all(one.holds and one.evidence for context in contexts for one in context.monitored)
 
 
 def test_b_crossed_limit_leads_to_retreat_and_a_lateral_move(trials: Any) -> None:
@@ -50,6 +54,8 @@ def test_b_crossed_limit_leads_to_retreat_and_a_lateral_move(trials: Any) -> Non
     verdicts: list[Verdict] = messages(log, "sa/verdict")
     crossing = next(verdict for verdict in verdicts if verdict.level == "soft")
     assert not crossing.visible
+    told = [verdicts[crossing.tick - ticks].crossing_tick for ticks in (20, 10, 5)]
+    assert told == pytest.approx([crossing.tick] * 3, abs=4)
     after_pull = next(
         state.tick for state in states if state.action and state.action.phase == "interrupted"
     )
