@@ -38,5 +38,17 @@ class ForeignLog(FrasError):
         )
 
 
+class NewerLog(FrasError):
+    """A log of a FRAS that came after this one; its messages may mean something else."""
+
+    def __init__(self, path: Path, version: str, ours: str) -> None:
+        super().__init__(
+            f"{path}: was written by FRAS {version}, this is {ours}: install {version} or newer",
+            path=path,
+            version=version,
+            ours=ours,
+        )
+
+
 class LogExists(FrasError):
     """A log is never written over."""

@@ -18,10 +18,11 @@ _DAMAGE = (McapError, CRCValidationError, UnicodeDecodeError, struct.error, zsta
 
 
 class RawMessage(NamedTuple):
-    """A message as recorded: its key without the cell, and its bytes."""
+    """A message as recorded: its key without the cell, its bytes, and when it arrived."""
 
     key: str
     payload: bytes
+    arrival_ns: int
 
 
 class LogReader:
@@ -43,6 +44,8 @@ class LogReader:
         The recorder's last record, `fras.closed`; empty where there is none.
     damage : str
         Why reading ended before the file's footer; empty when all of it was read.
+    bytes_read : int
+        How far reading has come in the file.
     """
 
     def __init__(self, path: Path) -> None:
@@ -50,6 +53,7 @@ class LogReader:
         self.metadata: dict[str, str] = {}
         self.closing: dict[str, str] = {}
         self.damage = "not read yet"
+        self.bytes_read = 0
 
     def messages(self) -> Iterator[RawMessage]:
         """Yield the messages in the order in which they arrived.
@@ -72,6 +76,7 @@ class LogReader:
         whole = False
         try:
             for record in records:
+                self.bytes_read = stream.tell()
                 match record:
                     case Channel(id=number, topic=topic):
                         keys[number] = topic
@@ -79,8 +84,10 @@ class LogReader:
                         self.metadata = dict(content)
                     case Metadata(name=name, metadata=content) if name == CLOSED:
                         self.closing = dict(content)
-                    case Message(channel_id=number, data=data) if number in keys:
-                        yield RawMessage(keys[number], data)
+                    case Message(channel_id=number, data=data, log_time=arrival_ns) if (
+                        number in keys
+                    ):
+                        yield RawMessage(keys[number], data, arrival_ns)
                     case Footer():
                         whole = True
                     case _:

@@ -1,12 +1,10 @@
 """From a log file to a `Trial`."""
 
-import tomllib
 from pathlib import Path
 
 from fras_cli.report.gathering import Gathering
 from fras_cli.report.trial import Trial
-from fras_common.scenario import Scenario
-from fras_common.scenario.loader import convert
+from fras_log.about import scenario_of, trial_of
 from fras_log.errors import ForeignLog
 from fras_log.reader import LogReader
 
@@ -30,31 +28,15 @@ def read_trial(path: Path) -> Trial:
     gathering: Gathering | None = None
     for message in reader.messages():
         if gathering is None:
-            gathering = Gathering(_trial_of(reader))
+            gathering = Gathering(trial_of(reader))
         gathering.take(message)
     if gathering is None:
-        gathering = Gathering(_trial_of(reader))
+        gathering = Gathering(trial_of(reader))
     elif gathering.known == 0:
         raise ForeignLog(path, "it holds no message of a key that FRAS knows")
     return gathering.trial(
         path=str(path),
         damage=reader.damage,
         metadata={**reader.metadata, "head": reader.closing.get("head", "")},
-        scenario=_scenario_of(reader),
+        scenario=scenario_of(reader),
     )
-
-
-def _trial_of(reader: LogReader) -> str:
-    if "trial" not in reader.metadata:
-        raise ForeignLog(reader.path, "it lacks the metadata record `fras` with the trial's name")
-    return reader.metadata["trial"]
-
-
-def _scenario_of(reader: LogReader) -> Scenario:
-    if "scenario" not in reader.metadata:
-        raise ForeignLog(reader.path, "its metadata record `fras` lacks the scenario")
-    try:
-        raw = tomllib.loads(reader.metadata["scenario"])
-    except tomllib.TOMLDecodeError as error:
-        raise ForeignLog(reader.path, f"its recorded scenario is no TOML: {error}") from error
-    return convert(raw, f"{reader.path}, recorded scenario")

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fras_log.anchors import normals
+
 FloatArray = NDArray[np.float64]
 
 ELEVATION_RAD = math.radians(32.0)
@@ -47,15 +49,6 @@ class Camera:
 def facing(camera: Camera, triangles_m: FloatArray) -> NDArray[np.bool_]:
     """Which triangles, shape (n, 3, 3), wound outwards, show their outside to the camera."""
     return normals(triangles_m) @ camera.axes[2] > 0.0
-
-
-def normals(triangles_m: FloatArray) -> FloatArray:
-    """Outward unit normals, shape (n, 3); zero for a degenerate triangle."""
-    first = triangles_m[:, 1] - triangles_m[:, 0]
-    second = triangles_m[:, 2] - triangles_m[:, 0]
-    product = np.cross(first, second)
-    length = np.linalg.norm(product, axis=1, keepdims=True)
-    return np.divide(product, length, out=np.zeros_like(product), where=length > 0.0)
 
 
 def seen_share(camera: Camera, points_m: FloatArray, triangles_m: FloatArray) -> float:

@@ -6,16 +6,18 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.colors import Normalize, to_rgb
 
-from fras_cli.report.figures.camera import Camera, FloatArray, facing, normals
+from fras_cli.report.figures.camera import Camera, FloatArray, facing
 from fras_cli.report.figures.style import force_colours
 from fras_common.messages import Pose, TissueModel, TissueState
+from fras_log import colours as palette
+from fras_log.anchors import bind, normals
 
 ROI_RADIUS_M = 0.003
-ROI_COLOUR = "#0072b2"
-TOOL_COLOUR = "#6e7781"
+ROI_COLOUR = palette.ROI
+TOOL_COLOUR = palette.TOOL
 TOOL_RADIUS_M = 0.0014
 TOOL_LENGTH_M = 0.03
-DOT_COLOUR = "#3b4252"
+DOT_COLOUR = palette.ATTACHMENT
 DOT_RADIUS_M = 0.00055
 # A dot lies on a triangle whose middle may be nearer to the camera than the dot.
 DOT_NEARER_M = 0.004
@@ -131,25 +133,9 @@ def carried(
     upward : ndarray, shape (m, 3)
         Its outward normal there.
     """
-    surface, rest_m = model.surface.ints(), model.nodes_m.floats()
-    top = surface[normals(rest_m[surface])[:, 2] > 0.5]
-    now_m, rest_m = state.nodes_m.floats()[top], rest_m[top]
-    upward = normals(now_m)
-    origin, edge_1, edge_2 = rest_m[:, 0], rest_m[:, 1] - rest_m[:, 0], rest_m[:, 2] - rest_m[:, 0]
-    double_area = edge_1[:, 0] * edge_2[:, 1] - edge_1[:, 1] * edge_2[:, 0]
-    places, directions = [np.empty((0, 3))], [np.empty((0, 3))]
-    for point in points_m:
-        offset = point[:2] - origin[:, :2]
-        b = (offset[:, 0] * edge_2[:, 1] - offset[:, 1] * edge_2[:, 0]) / double_area
-        c = (edge_1[:, 0] * offset[:, 1] - edge_1[:, 1] * offset[:, 0]) / double_area
-        over = np.flatnonzero((b >= -1e-9) & (c >= -1e-9) & (b + c <= 1.0 + 1e-9))
-        if over.size:
-            height_m = origin[over, 2] + b[over] * edge_1[over, 2] + c[over] * edge_2[over, 2]
-            best = over[np.argmax(height_m)]
-            weights = np.array([1.0 - b[best] - c[best], b[best], c[best]])
-            places.append((weights @ now_m[best])[None])
-            directions.append(upward[best][None])
-    return np.concatenate(places), np.concatenate(directions)
+    anchors = bind(model.nodes_m.floats(), model.surface.ints(), points_m)
+    now_m = state.nodes_m.floats()
+    return anchors.places(now_m), anchors.upward(now_m)
 
 
 def roi_points(model: TissueModel) -> FloatArray:

@@ -18,18 +18,17 @@ from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from fras_log import colours as palette
+
 if TYPE_CHECKING:
     from matplotlib.typing import RcKeyType
 
 INK: Final = "#1f2328"
 FAINT: Final = "#8b949e"
-LIMIT: Final = "#d55e00"
+LIMIT: Final = palette.LIMIT
 FORCE: Final = "#1f2328"
 VISIBILITY: Final = "#0072b2"
-# Lightness falls evenly from pale tissue to violet, so it reads in grey and under every vision.
-FORCE_MAP: Final = LinearSegmentedColormap.from_list(
-    "force", ["#f8e5d9", "#fdcaa4", "#fb8a63", "#d2426f", "#802582", "#2b115e"]
-)
+FORCE_MAP: Final = LinearSegmentedColormap.from_list("force", list(palette.FORCE_STOPS))
 # Of the pixels inside vector figures: sharp on screens that double theirs, and in print.
 RASTER_DPI: Final = 180
 
