@@ -329,6 +329,35 @@ def log_show(
     show_log(_log_file(log), key, Console(), as_json=json, first_tick=first, last_tick=last)
 
 
+@log_app.command("export")
+def log_export(
+    log: Annotated[Path, typer.Argument(help="An audit log, or a run's folder.")],
+    foxglove: Annotated[
+        bool, typer.Option("--foxglove", help="Write an MCAP file for Foxglove and Lichtblick.")
+    ] = False,
+    rerun: Annotated[
+        bool, typer.Option("--rerun", help="Write an .rrd file for Rerun; needs the extra `rerun`.")
+    ] = False,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="File to write; with both formats, its name without the ending.",
+            show_default="beside the log",
+        ),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite what is there.")] = False,
+    layout: Annotated[
+        bool, typer.Option("--layout", help="Write a layout to import beside the Foxglove file.")
+    ] = False,
+) -> None:
+    """Export a trial for viewers: scene, force and visibility, and the plans' reasons."""
+    from fras_cli.log_export import export_log
+    from fras_log.export import Format
+
+    kinds = [Format.FOXGLOVE] * foxglove + [Format.RERUN] * rerun
+    raise typer.Exit(export_log(_log_file(log), kinds, out, force, layout, _console()))
+
+
 @scenario_app.command("new")
 def scenario_new(
     seed: Annotated[int, typer.Option(help="Seed of the scene.")],

@@ -1,6 +1,7 @@
 """Exit status of a command that ended in a known error."""
 
 from fras_cli.keep import DownTimeout
+from fras_cli.log_export import NoFormat
 from fras_cli.run import (
     EXIT_BAD_INPUT,
     EXIT_INTERRUPTED,
@@ -16,6 +17,7 @@ from fras_common.bus.zenoh_bus import NoRouter
 from fras_common.errors import FrasError
 from fras_common.scenario import ScenarioError
 from fras_common.service.extras import MissingExtra
+from fras_log.export import OutputExists, OutputIsLog
 from fras_supervisor import (
     BadEndpoint,
     CommandNotFound,
@@ -28,7 +30,17 @@ from fras_supervisor import (
     Unstoppable,
 )
 
-BAD_INPUT = (BadCell, BadEndpoint, FolderInUse, LogDirUnusable, OtherRules, ScenarioError)
+BAD_INPUT = (
+    BadCell,
+    BadEndpoint,
+    FolderInUse,
+    LogDirUnusable,
+    NoFormat,
+    OtherRules,
+    OutputExists,
+    OutputIsLog,
+    ScenarioError,
+)
 STACK_ERRORS = (
     CommandNotFound,
     DownTimeout,

@@ -1,0 +1,6 @@
+"""From a log to files that viewers open: Foxglove and Lichtblick, and Rerun."""
+
+from fras_log.export.exporting import Exported, export
+from fras_log.export.outputs import Format, NothingToExport, OutputExists, OutputIsLog
+
+__all__ = ["Exported", "Format", "NothingToExport", "OutputExists", "OutputIsLog", "export"]
