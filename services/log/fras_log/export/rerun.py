@@ -82,8 +82,7 @@ class RerunFile:
                 self._add("/world/above_limit", self._above_columns, fact.moment, fact)
             case Arms():
                 for name, tool in fact.instruments.items():
-                    self._add(f"/world/{name}", _tool_columns, fact.moment, tool)
-                    self._add(f"/world/{name}_tip", _tip_columns, fact.moment, tool)
+                    self._add_tool(name, fact.moment, tool)
             case Blocks():
                 self._add("/world/blocks", _block_columns, fact.moment, fact)
             case Gauges():
@@ -106,6 +105,13 @@ class RerunFile:
         rows.append((moment, row))
         if len(rows) >= BATCH:
             self._send(path)
+
+    def _add_tool(self, name: str, moment: Moment, tool: Instrument) -> None:
+        tip = f"/world/{name}_tip"
+        if tip not in self._rows:
+            self._log_static(tip, rr.TransformAxes3D(axis_length=shapes.TIP_AXES_M))
+        self._add(tip, _tip_columns, moment, tool)
+        self._add(f"/world/{name}", _tool_columns, moment, tool)
 
     def _send_all(self) -> None:
         for path in self._rows:

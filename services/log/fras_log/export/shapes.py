@@ -30,6 +30,7 @@ ATTACHMENT_RADIUS_M: Final = 0.0008
 ABOVE_RADIUS_M: Final = 0.0012
 RING_RADIUS_M: Final = 0.00025
 ABOVE_M: Final = np.array([0.0, 0.0, 0.006])
+TIP_AXES_M: Final = 0.008
 SHAFT_RADIUS_M: Final = 0.0014
 BLADE_RADIUS_M: Final = 0.0008
 BLOCK_RADII_M: Final[dict[BlockKind, float]] = {

@@ -19,7 +19,7 @@ from fras_common.messages import (
     Verdict,
 )
 from fras_common.scenario import Scenario
-from fras_common.topics import TISSUE_MODEL, TISSUE_STATE, topic_of
+from fras_common.topics import CONTEXT, TISSUE_MODEL, TISSUE_STATE, topic_of
 from fras_log.anchors import Anchors, FloatArray, bind
 from fras_log.export.facts import (
     Arms,
@@ -37,7 +37,6 @@ from fras_log.export.instruments import instrument
 from fras_log.reader import RawMessage
 
 NOT_A_NUMBER: Final = float("nan")
-_BLOCK = re.compile(r"b\((\d+),(\d+)\)")
 _FIXED = re.compile(r"fixed\((b\(\d+,\d+\))\)")
 
 
@@ -66,6 +65,7 @@ class Teller:
         self._stage: Stage | None = None
         self._nodes_m: FloatArray | None = None
         self._block_names: tuple[str, ...] = ()
+        self._blocks_rest_m: FloatArray = np.empty((0, 3))
         self._anchors: Anchors | None = None
         self._fixed: frozenset[str] = frozenset()
         self._chosen = ""
@@ -177,7 +177,11 @@ class Teller:
         )
 
     def _on_context(self, context: Context, moment: Moment) -> Iterator[Fact]:
-        self._block_names = tuple(name for name in context.names if _BLOCK.fullmatch(name))
+        if len(context.blocks_m) != len(context.names):
+            problem = f"{len(context.blocks_m)} for {len(context.names)} names"
+            raise MalformedMessage(CONTEXT.key, "$.blocks_m", problem)
+        self._block_names = tuple(context.names)
+        self._blocks_rest_m = np.array(context.blocks_m, dtype=np.float64).reshape(-1, 3)
         self._fixed = frozenset(
             found[1] for fluent in context.fluents if (found := _FIXED.fullmatch(fluent))
         )
@@ -224,24 +228,12 @@ class Teller:
         if self._stage is None or not self._block_names or self._nodes_m is None:
             return
         if self._anchors is None:
-            self._anchors = bind(
-                self._stage.rest_m, self._stage.surface, self._centres_m(self._stage)
-            )
+            stage, rest_m = self._stage, self._blocks_rest_m
+            self._anchors = bind(stage.rest_m, stage.surface, rest_m)
         bound: list[int] = self._anchors.points.tolist()
         names = tuple(self._block_names[index] for index in bound)
         places_m = self._anchors.places(self._nodes_m)
         yield Blocks(moment, names, places_m, tuple(self._kind(name) for name in names))
-
-    def _centres_m(self, stage: Stage) -> FloatArray:
-        """Where the blocks are at rest, seen from above, shape (n, 2) [m].
-
-        A context has them where they were when it was asked for; its names tell where at rest.
-        """
-        corners_m = stage.rest_m[np.unique(stage.surface)][:, :2]
-        lower_m = corners_m.min(axis=0)
-        cell_m = (corners_m.max(axis=0) - lower_m) / self._awareness.blocks
-        cells = [found.groups() for name in self._block_names if (found := _BLOCK.fullmatch(name))]
-        return lower_m + (np.array(cells, dtype=np.float64) - 0.5) * cell_m
 
     def _kind(self, name: str) -> BlockKind:
         if name in self._held:

@@ -1,0 +1,47 @@
+"""The trial that the reports are tested with, exported."""
+
+from pathlib import Path
+
+import pytest
+from tests.cli.report import conftest as made
+
+from fras_common.messages import Context
+from fras_log.export import Format, export
+
+CELLS = [(i, j) for i in range(1, 8) for j in range(1, 8)]
+CONTEXT = Context(
+    tick=0,
+    request_id="c0",
+    fluents=["fixed(b(1,1))", "fixed(b(4,4))", "fixed(b(2,7))", "reachable(psm1,b(4,4))"],
+    evidence={},
+    names=[f"b({i},{j})" for i, j in CELLS],
+    blocks_m=[((i - 0.5) / 7 * 0.1, (j - 0.5) / 7 * 0.12, 0.005) for i, j in CELLS],
+    roi_m=(0.0, 0.0, 0.0),
+    fixed_points_m=[],
+)
+
+
+@pytest.fixture(scope="session")
+def trial_log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The log of a whole trial, and of a message that none can understand."""
+    path = tmp_path_factory.mktemp("trial") / "audit.mcap"
+    log = made.open_log(path)
+    log.put("sa/context", CONTEXT)
+    made.write_trial(log)
+    log.raw("sim/tissue_state", b"\xc1 no message")
+    log.file.close({"reason": "closed"})
+    return path
+
+
+@pytest.fixture(scope="session")
+def foxglove_file(trial_log: Path) -> Path:
+    path = trial_log.with_name("trial.foxglove.mcap")
+    export(trial_log, {Format.FOXGLOVE: path})
+    return path
+
+
+@pytest.fixture(scope="session")
+def rerun_file(trial_log: Path) -> Path:
+    path = trial_log.with_name("trial.rrd")
+    export(trial_log, {Format.RERUN: path})
+    return path
