@@ -22,6 +22,7 @@ MOVING = {
     "/world/psm2": TICKS,
     "/world/psm2_tip": TICKS,
     "/world/blocks": TICKS + 3,
+    "/world/grasp": TICKS + 3,
     "/force/measured": TICKS,
     "/force/limit": TICKS,
     "/force/hard_limit": TICKS,
@@ -118,6 +119,16 @@ def test_numbers_and_words_are_those_of_the_trial(read: Any, trial_log: Path) ->
     assert [text for text in said if text in reasons] == reasons
     levels = dict(zip(said, (level for (level,) in moving["/log"]["TextLog:level"]), strict=True))
     assert levels["motion: pull(psm1,b(4,4)) interrupted: force_soft"] == "WARN"
+
+
+def test_the_block_that_is_grasped_is_named(read: Any) -> None:
+    moving, _ = read
+    named = [labels or [] for labels in moving["/world/grasp"]["Points3D:labels"]]
+    assert named[:2] == [[], ["b(4,4) chosen"]]
+    assert named[-1] == ["b(4,4) held"]
+    assert [len(places) for places in moving["/world/blocks"]["Points3D:positions"]] == [49] * (
+        TICKS + 3
+    )
 
 
 def test_it_opens_with_views_of_its_own(rerun_file: Path) -> None:

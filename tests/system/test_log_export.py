@@ -85,10 +85,10 @@ def test_rerun_opens_it(log: Path, outputs: dict[Format, Path], tmp_path: Path) 
     assert tissue["published"] == [state.stamp_ns for state in states]
     last = tissue["Mesh3D:vertex_positions"][-1]
     np.testing.assert_array_equal(last, states[-1].nodes_m.view())
-    held = [labels for labels in moving["/world/blocks"]["Points3D:labels"] if any(labels)]
+    named = [labels for labels in moving["/world/grasp"]["Points3D:labels"] if labels]
     grasped = next(plan for plan in messages(log, "planner/plan") if plan.target).target
-    assert f"{grasped} chosen" in held[0]
-    assert f"{grasped} held" in held[-1]
+    assert named[0] == [f"{grasped} chosen"]
+    assert named[-1] == [f"{grasped} held"]
 
 
 def test_rerun_finds_nothing_wrong_with_the_other_file_either(

@@ -1,6 +1,6 @@
 """What a viewer can show of a trial, as plain values: no message format, no file format."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -140,6 +140,12 @@ class Blocks:
     names: tuple[str, ...]
     places_m: FloatArray
     kinds: tuple[BlockKind, ...]
+
+    def marked(self) -> Iterator[tuple[str, FloatArray, BlockKind]]:
+        """Yield name, place and kind of each block that is chosen or held."""
+        for name, place_m, kind in zip(self.names, self.places_m, self.kinds, strict=True):
+            if kind in ("chosen", "held"):
+                yield name, place_m, kind
 
 
 @dataclass(frozen=True)

@@ -161,12 +161,12 @@ def _tools(arms: Arms) -> Any:
 def _blocks(blocks: Blocks) -> Any:
     update = SceneUpdate_pb2.SceneUpdate()
     entity = _add_entity(update, "blocks", blocks.moment)
-    for name, place_m, kind in zip(blocks.names, blocks.places_m, blocks.kinds, strict=True):
-        colour = shapes.BLOCK_COLOURS[kind]
-        _add_spheres(entity, place_m[None], shapes.BLOCK_RADII_M[kind], colour)
-        if kind in ("chosen", "held"):
-            above_m = place_m + shapes.ABOVE_M
-            _add_text(entity, f"{name} {kind}", above_m, colour)
+    for place_m, kind in zip(blocks.places_m, blocks.kinds, strict=True):
+        radius_m, colour = shapes.BLOCK_RADII_M[kind], shapes.BLOCK_COLOURS[kind]
+        _add_spheres(entity, place_m[None], radius_m, colour)
+    for name, place_m, kind in blocks.marked():
+        words = f"{name} {kind}"
+        _add_text(entity, words, place_m + shapes.ABOVE_M, shapes.BLOCK_COLOURS[kind])
     return update
 
 

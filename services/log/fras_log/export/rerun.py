@@ -85,6 +85,8 @@ class RerunFile:
                     self._add_tool(name, fact.moment, tool)
             case Blocks():
                 self._add("/world/blocks", _block_columns, fact.moment, fact)
+                # Apart, because the viewer hides the words of so many points.
+                self._add("/world/grasp", _grasp_columns, fact.moment, fact)
             case Gauges():
                 for name, path in GAUGES.items():
                     self._add(path, _scalar_columns, fact.moment, getattr(fact, name))
@@ -218,17 +220,24 @@ def _tip_columns(rows: Sequence[Instrument]) -> Any:
 
 def _block_columns(rows: Sequence[Blocks]) -> Any:
     kinds: list[BlockKind] = [kind for row in rows for kind in row.kinds]
-    labels = [
-        f"{name} {kind}" if kind in ("chosen", "held") else ""
-        for row in rows
-        for name, kind in zip(row.names, row.kinds, strict=True)
-    ]
     return rr.Points3D.columns(
         positions=np.concatenate([row.places_m for row in rows]),
         radii=[shapes.BLOCK_RADII_M[kind] for kind in kinds],
         colors=np.array([palette.rgb(shapes.BLOCK_COLOURS[kind]) for kind in kinds], np.uint8),
-        labels=labels,
     ).partition([len(row.names) for row in rows])
+
+
+def _grasp_columns(rows: Sequence[Blocks]) -> Any:
+    """Name the block that is chosen or held, a little above it."""
+    marked = [list(row.marked()) for row in rows]
+    places_m = [place_m + shapes.ABOVE_M for row in marked for _, place_m, _ in row]
+    kinds: list[BlockKind] = [kind for row in marked for _, _, kind in row]
+    return rr.Points3D.columns(
+        positions=np.array(places_m).reshape(-1, 3),
+        radii=[shapes.RING_RADIUS_M] * len(kinds),
+        colors=[palette.rgb(shapes.BLOCK_COLOURS[kind]) for kind in kinds],
+        labels=[f"{name} {kind}" for row in marked for name, _, kind in row],
+    ).partition([len(row) for row in marked])
 
 
 def _scalar_columns(rows: Sequence[float]) -> Any:

@@ -13,8 +13,8 @@ GAP_M: Final = 0.012
 WIDTH_M: Final = 0.006
 CELLS: Final = 48
 # Where the viewers stand at first, as the report's camera likes to.
-EYE_M: Final = (0.19, -0.11, 0.15)
-LOOK_AT_M: Final = (0.05, 0.06, 0.02)
+EYE_M: Final = (0.165, -0.085, 0.12)
+LOOK_AT_M: Final = (0.055, 0.055, 0.015)
 # Path in a Rerun recording, colour on its dark and its light ground, name.
 SERIES: Final = (
     ("/force/measured", "#56b4e9", "force"),
