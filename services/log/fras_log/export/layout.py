@@ -54,13 +54,16 @@ def layout() -> bytes:
 
 
 def _scene(across: float, depth: float, up: float) -> dict[str, Any]:
-    """Look from where the report's camera likes to stand, in the viewer's spherical terms."""
+    """Look from where the report's camera likes to stand, in the viewer's spherical terms.
+
+    Its angle about z is counted from -y, clockwise seen from above.
+    """
     return {
         "cameraState": {
             "perspective": True,
             "distance": hypot(across, depth, up),
             "phi": degrees(atan2(hypot(across, depth), up)),
-            "thetaOffset": degrees(atan2(across, -depth)),
+            "thetaOffset": degrees(atan2(-across, -depth)),
             "target": [0, 0, 0],
             "targetOffset": list(shapes.LOOK_AT_M),
             "targetOrientation": [0, 0, 0, 1],
@@ -94,6 +97,7 @@ def _plot(title: str, series: list[tuple[str, str]]) -> dict[str, Any]:
     ]
     return {
         "foxglovePanelTitle": title,
+        "lichtblickPanelTitle": title,
         "paths": paths,
         "xAxisVal": "timestamp",
         "showLegend": True,
