@@ -8,6 +8,7 @@ from tests.cli.report import conftest as made
 from fras_common.messages import Context
 from fras_log.export import Format, export
 
+UNDER_WAY_NS = 777_777
 CELLS = [(i, j) for i in range(1, 8) for j in range(1, 8)]
 CONTEXT = Context(
     tick=0,
@@ -18,6 +19,7 @@ CONTEXT = Context(
     blocks_m=[((i - 0.5) / 7 * 0.1, (j - 0.5) / 7 * 0.12, 0.005) for i, j in CELLS],
     roi_m=(0.0, 0.0, 0.0),
     fixed_points_m=[],
+    monitored=[],
 )
 
 
@@ -26,6 +28,9 @@ def trial_log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The log of a whole trial, and of a message that none can understand."""
     path = tmp_path_factory.mktemp("trial") / "audit.mcap"
     log = made.open_log(path)
+    write = log.file.write
+    # Nothing arrives when it is sent; an export must not take the one for the other.
+    vars(log.file)["write"] = lambda sample, sent_ns: write(sample, sent_ns + UNDER_WAY_NS)
     log.put("sa/context", CONTEXT)
     made.write_trial(log)
     log.raw("sim/tissue_state", b"\xc1 no message")

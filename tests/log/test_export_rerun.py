@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 from tests.cli.report import conftest as made
+from tests.log.conftest import UNDER_WAY_NS
 
 from fras_log.colours import force_rgb
 from support.exported import columns_of, read_rerun, run_rerun
@@ -72,6 +73,7 @@ def test_each_message_of_the_source_has_a_row_and_its_times(read: Any, trial_log
         sent = messages(trial_log, key, with_garbage=True)
         assert columns["tick"] == [message.tick for message in sent]
         assert columns["published"] == [message.stamp_ns for message in sent]
+        assert columns["arrived"] == [message.stamp_ns + UNDER_WAY_NS for message in sent]
         assert columns["simulated"] == [100_000_000 * message.tick for message in sent]
 
 
