@@ -222,6 +222,7 @@ def test_a_missing_library_is_told_with_the_extra_that_brings_it(
 
 
 def test_progress_is_told_once_it_takes_long(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("fras_cli.log_export.QUIET_S", 3600.0)
     assert "exporting" not in told(log, [Format.FOXGLOVE])
     monkeypatch.setattr("fras_cli.log_export.QUIET_S", 0.0)
     text = told(log, [Format.FOXGLOVE], overwrite=True)
