@@ -1,6 +1,7 @@
 """What an export does with logs that are cut, foreign or newer, and with files in its way."""
 
 import io
+import resource
 import shutil
 import sys
 from collections.abc import Callable
@@ -16,7 +17,14 @@ from fras_cli.app import main
 from fras_cli.log_export import NoFormat, export_log
 from fras_log import ForeignLog, LogFile, NoSuchLog, NotAnMcap
 from fras_log.errors import NewerLog
-from fras_log.export import Format, NothingToExport, OutputExists, OutputIsLog, export
+from fras_log.export import (
+    Format,
+    NothingToExport,
+    OutputExists,
+    OutputIsLog,
+    OutputUnwritable,
+    export,
+)
 from support.exported import parse_publicly, read_foxglove, read_rerun, run_rerun
 
 BOTH = [Format.FOXGLOVE, Format.RERUN]
@@ -178,6 +186,19 @@ def test_an_export_that_breaks_off_leaves_nothing(
     monkeypatch.setattr("fras_log.export.foxglove.FoxgloveFile.close", full)
     with pytest.raises(OSError, match="No space left"):
         told(log, BOTH)
+    assert list(log.parent.iterdir()) == [log]
+
+
+@pytest.mark.parametrize("kind", BOTH)
+def test_a_full_disk_is_told_and_leaves_nothing(kind: Format, log: Path) -> None:
+    """A limit on the size of files stands for it: the system refuses to write on."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, hard))
+    try:
+        with pytest.raises((OSError, OutputUnwritable)):
+            told(log, [kind])
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     assert list(log.parent.iterdir()) == [log]
 
 

@@ -9,7 +9,7 @@ from tests.cli.report import conftest as made
 from tests.log.conftest import CONTEXT
 
 from fras_common.codec import encode
-from fras_common.messages import ArmState, Array, Header, NoPlan, Pose
+from fras_common.messages import ActionResult, ArmState, Array, Header, NoPlan, Pose
 from fras_log.anchors import vertex_normals
 from fras_log.colours import FORCE_STOPS, force_rgb, rgb
 from fras_log.export.facts import Arms, Blocks, Fact, Gauges, Sentence, Stage, Tissue
@@ -164,6 +164,15 @@ def test_a_plan_that_does_not_exist_says_why(teller: Teller) -> None:
         ("info", "plan 1 (initial, weighted): no plan"),
         ("warning", "Every block in reach is attached."),
     ]
+
+
+def test_an_action_without_a_block_is_told_without_one(teller: Teller) -> None:
+    result = ActionResult(
+        tick=4, goal_id="g4", name="release", arm="psm1", block="", outcome="succeeded", reason=""
+    )
+    (said,) = tell(teller, "motion/action_result", result)
+    assert isinstance(said, Sentence)
+    assert said.text == "release(psm1) succeeded"
 
 
 def test_what_was_broken_is_said_as_an_error(teller: Teller) -> None:

@@ -17,7 +17,7 @@ from fras_common.bus.zenoh_bus import NoRouter
 from fras_common.errors import FrasError
 from fras_common.scenario import ScenarioError
 from fras_common.service.extras import MissingExtra
-from fras_log.export import OutputExists, OutputIsLog
+from fras_log.export import OutputExists, OutputIsLog, OutputUnwritable
 from fras_supervisor import (
     BadEndpoint,
     CommandNotFound,
@@ -39,6 +39,7 @@ BAD_INPUT = (
     OtherRules,
     OutputExists,
     OutputIsLog,
+    OutputUnwritable,
     ScenarioError,
 )
 STACK_ERRORS = (

@@ -1,6 +1,20 @@
 """From a log to files that viewers open: Foxglove and Lichtblick, and Rerun."""
 
 from fras_log.export.exporting import Exported, export
-from fras_log.export.outputs import Format, NothingToExport, OutputExists, OutputIsLog
+from fras_log.export.outputs import (
+    Format,
+    NothingToExport,
+    OutputExists,
+    OutputIsLog,
+    OutputUnwritable,
+)
 
-__all__ = ["Exported", "Format", "NothingToExport", "OutputExists", "OutputIsLog", "export"]
+__all__ = [
+    "Exported",
+    "Format",
+    "NothingToExport",
+    "OutputExists",
+    "OutputIsLog",
+    "OutputUnwritable",
+    "export",
+]

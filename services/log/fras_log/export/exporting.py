@@ -76,7 +76,7 @@ def export(
     ------
     NoSuchLog, NotAnMcap, ForeignLog, NewerLog, ScenarioError
         There is nothing to export. Nothing is written.
-    NothingToExport, OutputExists, OutputIsLog
+    NothingToExport, OutputExists, OutputIsLog, OutputUnwritable
     MissingExtra
         A format's library is not installed.
     """

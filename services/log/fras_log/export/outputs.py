@@ -32,6 +32,13 @@ class OutputIsLog(FrasError):
         super().__init__(f"{path} is the log: it is never written, give another --out", path=path)
 
 
+class OutputUnwritable(FrasError):
+    """A file can't be written to its end."""
+
+    def __init__(self, problem: str) -> None:
+        super().__init__(f"the export cannot be written: {problem}", problem=problem)
+
+
 class NothingToExport(FrasError):
     """The log holds nothing of its trial that a viewer could show."""
 

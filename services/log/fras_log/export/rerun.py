@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
@@ -26,6 +27,7 @@ from fras_log.export.facts import (
     Stage,
     Tissue,
 )
+from fras_log.export.outputs import OutputUnwritable
 
 BATCH: Final = 64
 GAUGES: Final[dict[str, str]] = {
@@ -39,6 +41,15 @@ GAUGES: Final[dict[str, str]] = {
 }
 _LEVELS: Final[dict[Level, str]] = {"info": "INFO", "warning": "WARN", "error": "ERROR"}
 _Columns = Callable[[Sequence[Any]], Any]
+
+
+@contextmanager
+def _named() -> Generator[None]:
+    """Give a name to what the library says of a full disk: a thread of its own writes."""
+    try:
+        yield
+    except RuntimeError as error:
+        raise OutputUnwritable(str(error)) from error
 
 
 class RerunFile:
@@ -64,7 +75,8 @@ class RerunFile:
         self._columns: dict[str, _Columns] = {}
         # Its own properties would say when it was exported, not when it happened.
         self._recording = rr.RecordingStream("fras", send_properties=False)
-        self._recording.save(path, default_blueprint=blueprint())
+        with _named():
+            self._recording.save(path, default_blueprint=blueprint())
         self._recording.send_recording_name(about["trial"])
         self._recording.send_property("fras", rr.AnyValues(drop_untyped_nones=True, **about))
         self._log_static("/world", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
@@ -98,7 +110,8 @@ class RerunFile:
         self._send_all()
         if damage:
             self._recording.send_property("fras_cut", rr.AnyValues(damage=damage))
-        self._recording.flush()
+        with _named():
+            self._recording.flush()
         self._recording.disconnect()
 
     def _add(self, path: str, columns: _Columns, moment: Moment, row: Any) -> None:

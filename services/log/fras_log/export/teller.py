@@ -208,7 +208,8 @@ class Teller:
     def _on_result(self, result: ActionResult, moment: Moment) -> Iterator[Fact]:
         fine = result.outcome == "succeeded"
         reason = f": {result.reason}" if result.reason else ""
-        text = f"{result.name}({result.arm},{result.block}) {result.outcome}{reason}"
+        arguments = f"{result.arm},{result.block}" if result.block else result.arm
+        text = f"{result.name}({arguments}) {result.outcome}{reason}"
         yield Sentence(moment, "info" if fine else "warning", "motion", text)
 
     def _on_status(self, status: TaskStatus, moment: Moment) -> Iterator[Fact]:
