@@ -115,6 +115,22 @@ def test_no_tick_without_the_verdict_on_the_present_one(bench: Bench) -> None:
     assert [state.verdict_tick for state in bench.states] == [-1, 0, 1]
 
 
+def test_the_verdict_of_before_said_again_is_no_fault(bench: Bench) -> None:
+    """SA answers a state that is said again, as with each new hold, with the same verdict."""
+    faults: list[FaultRecord] = bench.heard(FAULT.of(service="motion"))
+    bench.reset()
+    bench.reach()
+    bench.judge(0)
+    bench.judge(0)
+    bench.judge(1)
+    assert [state.tick for state in bench.states] == [0, 1, 2]
+    assert faults == []
+    bench.judge(0)
+    assert [fault.kind for fault in faults] == ["StaleVerdict"]
+    bench.judge(2)
+    assert bench.states[-1].tick == 3
+
+
 def test_verdict_for_another_trial_moves_nothing_and_is_counted(bench: Bench) -> None:
     bench.reset()
     bench.reach()
@@ -312,12 +328,13 @@ def test_refused_goal_is_on_the_bus_with_its_numbers_and_counted(bench: Bench) -
     assert health(bench).refusals == {"another_trial": 1, "workspace": 2}
 
 
-@pytest.mark.parametrize("other", [0, 2, 7])
+@pytest.mark.parametrize("other", [0, 3, 7])
 def test_verdict_on_another_tick_is_refused_by_name_on_the_bus(bench: Bench, other: int) -> None:
     faults: list[FaultRecord] = bench.heard(FAULT.of(service="motion"))
     bench.reset()
     bench.reach()
     bench.judge(0)
+    bench.judge(1)
     before = bench.states[-1]
     bench.judge(other)
     assert bench.states[-1] == before
@@ -326,10 +343,10 @@ def test_verdict_on_another_tick_is_refused_by_name_on_the_bus(bench: Bench, oth
         "StaleVerdict",
         other,
     )
-    assert faults[-1].values == {"expected": "1", "got": str(other)}
+    assert faults[-1].values == {"expected": "2", "got": str(other)}
     assert health(bench).refusals == {"verdict_tick": 1}
-    bench.judge(1)
-    assert bench.states[-1].tick == 2
+    bench.judge(2)
+    assert bench.states[-1].tick == 3
 
 
 def test_verdict_of_another_trial_is_refused_by_name_on_the_bus(bench: Bench) -> None:

@@ -317,6 +317,23 @@ def test_grasp_of_nothing_and_refused_reach_rule_the_block_out() -> None:
     ]
 
 
+@pytest.mark.parametrize("name", ["pull", "move"])
+def test_a_pull_or_move_that_motion_refuses_rules_the_block_out(name: str) -> None:
+    """Planned again, it would be refused again, until there are too many plans."""
+    reach, grasp, pull = pulling()
+    move = PlannedAction(
+        t=3, text=f"move(psm1,{OTHER})", name="move", args=["psm1", OTHER], expected=[]
+    )
+    world = World(
+        [[reach, grasp, pull if name == "pull" else move], []],
+        held,
+        refuse={pull.text if name == "pull" else move.text: "instrument_distance"},
+    )
+    end = world.run()
+    assert end.tried == [BLOCK]
+    assert [request.tried for request in world.requests] == [(), (BLOCK,)]
+
+
 def test_effect_that_did_not_come_is_a_deviation() -> None:
     world = World([pulling(), []], after(reach=[]))
     world.run()

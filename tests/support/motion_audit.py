@@ -164,7 +164,8 @@ def _planned(log: MotionLog) -> NDArray[np.bool_]:
 def moved_on_a_verdict(log: MotionLog) -> list[Finding]:
     """Each tick has the verdict on the one before it, and does what that verdict allows."""
     found: list[Finding] = []
-    verdicts = {verdict["tick"]: verdict for verdict in log.verdicts}
+    # The first on each tick: a state that is said again is judged again.
+    verdicts = {verdict["tick"]: verdict for verdict in reversed(log.verdicts)}
     for before, state in pairwise(log.ticks):
         tick, on = state["tick"], state["verdict_tick"]
         if on != tick - 1:

@@ -126,6 +126,11 @@ class MotionController:
         return course is not None and not (self._holds and course.stopped)
 
     @property
+    def verdict_tick(self) -> int:
+        """The verdict on which the arms came to where they are; -1 after a reset."""
+        return self._last.verdict_tick
+
+    @property
     def hard_latched(self) -> bool:
         """Whether an arm crossed the hard limit and has not succeeded in a release since."""
         return bool(self._latched)

@@ -116,6 +116,9 @@ class MotionService:
 
     def _on_verdict(self, verdict: m.Verdict) -> None:
         if self._trial is not None:
+            if verdict.tick == self._trial.controller.verdict_tick:
+                # The arms were said again, with a new hold, and so were judged again.
+                return
             self._trial.controller.expect(verdict.tick)
         self._verdict = verdict
 

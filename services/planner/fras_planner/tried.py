@@ -22,9 +22,10 @@ def newly_tried(
 ) -> list[str]:
     """Blocks that the end of `action` rules out.
 
-    A block is ruled out when it could not be reached or grasped; when the hard limit was crossed
-    with it in hand; when a move of it did not expose; and when a pull of it did not expose and it
-    is fixed or was chosen with the attachment points ignored.
+    A block is ruled out when it could not be reached or grasped; when motion refused to pull or
+    move it; when the hard limit was crossed with it in hand; when a move of it did not expose; and
+    when a pull of it did not expose and it is fixed or was chosen with the attachment points
+    ignored.
 
     Parameters
     ----------
@@ -37,18 +38,26 @@ def newly_tried(
         What was in hand when it began.
     """
     target = action.args[1] if len(action.args) > 1 else ""
-    if result is None or result.outcome == "failed":
-        return [target] if action.name in {"reach", "grasp"} else []
-    if held is None or result.reason == "hold":
-        return []
     holds = set(fluents)
+    if action.name in {"reach", "grasp"} and (result is None or result.outcome == "failed"):
+        return [target]
+    if held is None or action.name == "release":
+        return []
+    if result is None:
+        return _in_grip(action.args[0], held, holds)
+    if result.outcome == "failed" or result.reason == "hold":
+        return []
     hopeless = held.ignored_ap or f"fixed({held.block})" in holds
     in_vain = "visible_roi" not in holds and (
         action.name == "move" or (action.name == "pull" and hopeless)
     )
     if result.reason != "force_hard" and not in_vain:
         return []
-    # On a fine grid a gripper spans several blocks; to try its neighbour would be to try it again.
-    grip = f"in_hand({action.args[0]},"
+    return _in_grip(action.args[0], held, holds)
+
+
+def _in_grip(arm: str, held: Held, holds: set[str]) -> list[str]:
+    """Blocks in a gripper: on a fine grid, to try the neighbour would be to try it again."""
+    grip = f"in_hand({arm},"
     spanned = {atom[len(grip) : -1] for atom in holds if atom.startswith(grip)}
     return [held.block, *sorted(spanned - {held.block})]
