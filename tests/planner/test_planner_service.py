@@ -105,14 +105,29 @@ def test_health_tells_which_knowledge_is_used(bench: Bench) -> None:
     assert len(bench.host.facts["asp_digest"]) == 64
 
 
+def disk_full() -> RecorderStatus:
+    return RecorderStatus(
+        trial="t", state="error", path="", messages=0, bytes=0, lost=0, reason="disk full"
+    )
+
+
 def test_log_that_can_not_be_written_ends_the_trial(bench: Bench) -> None:
     bench.answer_recorder()
     bench.client.serve(MOTION_RESET, lambda call: None)  # the trial stays in its reset
     bench.task(scenario=SCENARIO)
-    status = RecorderStatus(
-        trial="t", state="error", path="", messages=0, bytes=0, lost=0, reason="disk full"
-    )
-    bench.client.publisher(RECORDER_STATUS).put(status)
+    bench.client.publisher(RECORDER_STATUS).put(disk_full())
     bench.run_until(lambda: bench.statuses[-1].phase == "idle")
     assert bench.statuses[-1].outcome == "aborted"
     assert bench.statuses[-1].reason == "hold:recorder: disk full"
+
+
+def test_a_trial_that_needs_no_log_goes_on_without(bench: Bench) -> None:
+    bench.answer_recorder()
+    waiting: list[Any] = []
+    bench.client.serve(MOTION_RESET, waiting.append)
+    run = RunSection(peer_timeout_s=0.2, require_log=False)
+    bench.task(scenario=resolve(Scenario(run=run)))
+    bench.run_until(lambda: waiting)
+    bench.client.publisher(RECORDER_STATUS).put(disk_full())
+    bench.settle()
+    assert bench.statuses[-1].phase == "resetting"

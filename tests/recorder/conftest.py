@@ -7,7 +7,8 @@ from typing import Any
 
 import pytest
 
-from fras_common.bus import MemoryBus, MemoryFabric
+from fras_common.bus import MemoryBus, MemoryFabric, RawSample
+from fras_common.codec import encode
 from fras_common.messages import (
     CloseRequest,
     Header,
@@ -48,6 +49,7 @@ class Stage:
         self.host.attach(self._own)
         self.speaker = MemoryBus(self.fabric, "test", "speaker/1")
         self.service = RecorderService(self.host)
+        self._deliver = self.service._on_sample  # noqa: SLF001 - as the bus does
         self._loop = threading.Thread(target=self.host.run, args=(self.service.wake,))
         self._loop.start()
         topics: Any = (ROBOT_STATE, TISSUE_STATE, VERDICT, TASK_STATUS)
@@ -102,6 +104,19 @@ class Stage:
         request = CloseRequest(trial=trial, last_tick=last_tick, status_seq=status_seq)
         self.speaker.ask(RECORDER_CLOSE, request, closing.settle, WAIT_S)
         return closing
+
+    def arrive(self, message: Header, key: str) -> None:
+        """Have a sample arrive as it is, with its own number and publisher."""
+        self._deliver(RawSample(key, encode(message), "application/msgpack"))
+
+    def other_bus(self, source: str) -> MemoryBus:
+        """Another participant of the cell."""
+        return MemoryBus(self.fabric, "test", source)
+
+    def until_last(self, state: str) -> None:
+        """Wait until the latest state is this one."""
+        with self._changed:
+            assert self._changed.wait_for(lambda: self.states[-1].state == state, WAIT_S)
 
     def settle(self) -> None:
         """Wait until everything said so far has been handled."""

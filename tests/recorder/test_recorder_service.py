@@ -1,5 +1,6 @@
 """The recorder's shell on a bus in memory: open, listen, wait, close."""
 
+import threading
 import time
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ from mcap.records import Channel, Message
 
 from fras_common.bus import RawSample, RemoteFault
 from fras_common.codec import content_digest, decode
-from fras_common.messages import CloseReply, LastRequest, Verdict
+from fras_common.messages import CloseReply, LastRequest, RecorderEvent, Verdict
 from fras_common.scenario import Scenario, to_toml
 from fras_common.topics import HEALTH, RECORDER_LAST
 from fras_log import LogFile
@@ -274,6 +275,70 @@ def test_what_is_written_can_be_decoded(stage: Stage, tmp_path: Path):
             for _, _, message in make_reader(stream).iter_messages(topics=["sa/verdict"])
         ]
     assert decode(Verdict, payload, "sa/verdict") == sent
+
+
+def a_verdict(seq: int) -> Verdict:
+    return Verdict(
+        seq=seq, source="sa/7", trial="t-1", tick=seq, level="ok", ok=True, reason="",
+        max_force_n=0.0, limit_n=0.5, hard_limit_n=1.0, visibility=0.0, visible=False,
+        max_height=[], force_rate_n_s=0.0, crossing_tick=-1, max_node_speed_m_s=0.0, grasped={},
+    )  # fmt: skip
+
+
+def messages_of(path: Path, key: str, kind: Any) -> list[Any]:
+    with path.open("rb") as stream:
+        return [
+            decode(kind, entry[2].data, key) for entry in make_reader(stream).iter_messages(key)
+        ]
+
+
+def test_who_is_there_comes_and_goes_and_what_is_missing_stands_in_the_log(
+    stage: Stage, tmp_path: Path
+):
+    stage.until("idle")
+    stage.speaker.announce("alive/sim")
+    stage.open(tmp_path)
+    stage.until("recording")
+    other = stage.other_bus("visitor/9")
+    other.announce("alive/visitor")
+    for seq in (0, 1, 4):
+        stage.arrive(a_verdict(seq), "sa/verdict")
+    other.close()
+    stage.ask_close(-1, -1).wait()
+    events = messages_of(tmp_path / "audit.mcap", "recorder/event", RecorderEvent)
+    seen = [(event.kind, event.subject, event.count) for event in events]
+    assert ("present", "alive/sim/1", 0) in seen
+    assert ("present", "alive/visitor/9", 0) in seen
+    assert ("gap", "sa/verdict sa/7", 2) in seen
+    assert ("absent", "alive/visitor/9", 0) in seen
+    assert all(event.trial == "t-1" for event in events)
+    assert stage.host.counts["gaps"] == 2
+
+
+def test_a_recorder_with_too_much_to_write_says_so_and_when_it_has_caught_up(
+    stage: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(recorder, "BEHIND", 20)
+    stage.until("idle")
+    stage.open(tmp_path)
+    stage.until("recording")
+    slow = threading.Event()
+    write = LogFile.write
+
+    def stuck(file: LogFile, sample: RawSample, arrival_ns: int):
+        slow.wait(10.0)
+        return write(file, sample, arrival_ns)
+
+    monkeypatch.setattr(LogFile, "write", stuck)
+    for tick in range(60):
+        stage.verdict(tick)
+    slow.set()
+    behind = stage.until("behind")
+    assert "wait to be written" in behind.reason
+    stage.until_last("recording")
+    closed = stage.ask_close(-1, -1).wait()
+    assert closed.lost == 0
+    assert recorded(tmp_path / "audit.mcap")["sa/verdict"] == list(range(60))
 
 
 def test_the_last_message_of_a_key_is_told_with_or_without_a_log(stage: Stage, tmp_path: Path):

@@ -141,7 +141,7 @@ def print_summary(console: Console, summary: Summary, places: Iterable[tuple[str
         *places,
     ]
     for name, value in rows:
-        table.add_row(Text(name, style="dim"), Text(value))
+        table.add_row(Text(name, style="dim"), Text(value, overflow="fold"))
     console.print(table)
 
 

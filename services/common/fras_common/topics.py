@@ -96,6 +96,9 @@ HOLDS = Topic("motion/holds", m.Holds, "motion", Qos.EVENT, "each change", in_tr
 RECORDER_STATUS = Topic(
     "recorder/status", m.RecorderStatus, "recorder", Qos.EVENT, "each change", in_trial=False
 )
+RECORDER_EVENT = Topic(
+    "recorder/event", m.RecorderEvent, "recorder", Qos.STATE, "each", in_trial=False
+)
 HEALTH = Topic("health/{service}", m.Health, "*", Qos.TELEMETRY, "2 Hz", in_trial=False)
 LOG = Topic("log/{service}", m.LogRecord, "*", Qos.STATE, "from WARNING up", in_trial=False)
 FAULT = Topic(
@@ -226,6 +229,7 @@ TOPICS: tuple[Topic[Any], ...] = (
     ACTION_RESULT,
     HOLDS,
     RECORDER_STATUS,
+    RECORDER_EVENT,
     HEALTH,
     LOG,
     FAULT,

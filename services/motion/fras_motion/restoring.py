@@ -32,15 +32,19 @@ class Restoring:
         self._done = host.not_before("holds restored")
         self._asking = False
         self._is_done = False
+        self._ask_at_s = 0.0
         host.require("recorder")
 
-    def wake(self) -> float | None:
+    def wake(self, now_s: float) -> float | None:
         """Ask if it is time to; seconds until it is again, or None."""
         if self._is_done or self._asking:
             return None
         if not self._host.present("alive/recorder"):
             return RETRY_S
+        if now_s < self._ask_at_s:
+            return self._ask_at_s - now_s
         self._asking = True
+        self._ask_at_s = now_s + RETRY_S
         request = LastRequest(key=HOLDS.key)
         self._host.bus.ask(RECORDER_LAST, request, self._on_answer, ANSWER_TIMEOUT_S)
         return None

@@ -21,6 +21,7 @@ from fras_motion.adapter import action_result, goal_of, parameters_of, robot_sta
 from fras_motion.arm_access import ArmAccess, remote_arms, simulated_arms
 from fras_motion.errors import Refused
 from fras_motion.holds import Holds
+from fras_motion.log_watch import LogWatch
 from fras_motion.pacing import Pacer
 from fras_motion.patience import Patience
 from fras_motion.peers import Peers
@@ -56,6 +57,7 @@ class MotionService:
         make_arms = ARM_ACCESS[driver]
         self._arms: ArmAccess = make_arms(host, self._holds)
         self._restoring = Restoring(host, self._restore_holds)
+        self._log = LogWatch(host, self._holds)
         self._state = host.publisher(ROBOT_STATE)
         self._result = host.publisher(ACTION_RESULT)
         host.subscribe(VERDICT, self._on_verdict)
@@ -77,6 +79,7 @@ class MotionService:
         self._verdict = None
         self._pacer = Pacer(scenario.tissue.dt_s, scenario.run.pace)
         self._patience = Patience(scenario.run.peer_timeout_s, scenario.run.hold_timeout_s)
+        self._log.begin(request.trial, required=scenario.run.require_log)
         self._host.enter_trial(request.trial)
         self._publish(trial)
         return m.ResetReply(digest=content_digest(request.trial, scenario, request.mesh))
@@ -93,6 +96,7 @@ class MotionService:
     def _begin_cancel(self, pending: Deferred[m.CancelRequest, m.CancelReply]) -> None:
         if self._trial is not None and self._trial.name == pending.request.trial:
             self._trial.cancel(pending.request.reason)
+            self._log.end()
         self._cancels.append(pending)
 
     def _hold(self, request: m.HoldRequest) -> m.HoldState:
@@ -124,10 +128,11 @@ class MotionService:
 
     def wake(self) -> float | None:
         """Do the next tick if it is due; else see whether something has been missing too long."""
+        self._log.wake()
         waits_s = (
             self._wake_trial(),
             self._arms.wake(self._trial, time.monotonic()),
-            self._restoring.wake(),
+            self._restoring.wake(time.monotonic()),
         )
         return min(wait_s for wait_s in waits_s if wait_s is not None)
 

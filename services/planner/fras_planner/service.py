@@ -40,6 +40,7 @@ class PlannerService:
         self._plans: PlanMaker | None = None
         self._starter: Deferred[TaskRequest, TaskReply] | None = None
         self._peer_timeout_s = 0.0
+        self._requires_log = True
         self._motion_gone_since_s: float | None = None
         host.require("sim", "sa", "recorder")
         host.subscribe(ACTION_RESULT, self._performer.deliver)
@@ -59,6 +60,7 @@ class PlannerService:
         else:
             scenario = request.scenario
             self._peer_timeout_s = scenario.run.peer_timeout_s
+            self._requires_log = scenario.run.require_log
             self._starter = pending
             make_plan = PlanMaker(self._knowledge, scenario, time.perf_counter)
             self._plans = make_plan
@@ -88,7 +90,7 @@ class PlannerService:
         running = self._executive
         if running is None or running.ending or status.trial != running.status.trial:
             return
-        if status.state == "error":
+        if status.state == "error" and self._requires_log:
             self._performer.drive(TaskAborted(f"hold:recorder: {status.reason}"))
 
     def _on_end(self, error: FrasError | None) -> None:

@@ -3,6 +3,8 @@
 import time
 from pathlib import Path
 
+import msgspec
+
 from fras_common.bus import RawSample
 from fras_common.codec import content_digest
 from fras_common.errors import FrasError
@@ -12,12 +14,19 @@ from fras_common.messages import (
     LastReply,
     LastRequest,
     OpenRequest,
+    RecorderEvent,
     RecorderStatus,
     ResetReply,
 )
 from fras_common.messages.recorder import LogState
-from fras_common.service import Deferred, ServiceHost
-from fras_common.topics import RECORDER_CLOSE, RECORDER_LAST, RECORDER_OPEN, RECORDER_STATUS
+from fras_common.service import INBOX, Deferred, ServiceHost
+from fras_common.topics import (
+    RECORDER_CLOSE,
+    RECORDER_EVENT,
+    RECORDER_LAST,
+    RECORDER_OPEN,
+    RECORDER_STATUS,
+)
 from fras_log import LogFile
 from fras_log.keys import default_key_path, load_or_make
 from fras_recorder.completeness import Completeness
@@ -26,6 +35,8 @@ from fras_recorder.contents import open_log
 FLUSH_S = 0.5
 QUIET_S = 0.05
 CLOSE_TIMEOUT_S = 3.0
+# Of the inbox's places; what comes when it is full is lost. Four seconds of a trial at pace 1.
+BEHIND = INBOX // 4
 
 
 class NothingToClose(FrasError):
@@ -64,18 +75,37 @@ class RecorderService:
         host.serve(RECORDER_OPEN, self._open)
         host.serve_deferred(RECORDER_CLOSE, self._begin_close)
         host.serve(RECORDER_LAST, self._tell_last)
+        self._event = host.publisher(RECORDER_EVENT)
+        self._is_behind = False
+        self._tokens: set[str] = set()
         host.bus.subscribe_raw("**", self._on_sample)
+        host.bus.watch_tokens(self._on_token)
         self._publish("idle")
 
     def _on_sample(self, sample: RawSample) -> None:
         arrival_ns = time.time_ns()
         self._host.post(lambda: self._write(sample, arrival_ns))
 
+    def _on_token(self, token: str, present: bool) -> None:
+        self._host.post(lambda: self._note_token(token, present))
+
+    def _note_token(self, token: str, present: bool) -> None:
+        if present:
+            self._tokens.add(token)
+        else:
+            self._tokens.discard(token)
+        kind = "present" if present else "absent"
+        self._tell(RecorderEvent(kind=kind, subject=token, count=0))
+
+    def _tell(self, event: RecorderEvent) -> None:
+        self._event.put(msgspec.structs.replace(event, trial=self._seen.trial))
+
     def _write(self, sample: RawSample, arrival_ns: int) -> None:
         self._last[sample.key] = sample.payload
         if self._file is None:
             return
         self._last_arrival_s = time.monotonic()
+        lost = self._file.lost
         try:
             header = self._file.write(sample, arrival_ns)
         except OSError as error:
@@ -85,15 +115,22 @@ class RecorderService:
             self._host.log.warning("sample without a header recorded", key=sample.key)
         else:
             self._seen.note(sample.key, header.trial, header.tick, header.seq)
+            if (missing := self._file.lost - lost) > 0:
+                self._host.counts["gaps"] += missing
+                subject = f"{sample.key} {header.source}"
+                self._tell(RecorderEvent(kind="gap", subject=subject, count=missing))
 
     def _open(self, request: OpenRequest) -> ResetReply:
         # The new one first: a folder that can't take it must not cost the log that is open.
         file = open_log(request, time.time_ns(), self._signer)
         self._finish("superseded")
         self._file = file
+        self._is_behind = False
         self._seen = Completeness(request.trial)
         self._host.gate.trial = request.trial
         self._publish("recording")
+        for token in sorted(self._tokens):
+            self._tell(RecorderEvent(kind="present", subject=token, count=0))
         self._host.log.info("log opened", path=str(file.path), trial=request.trial)
         return ResetReply(digest=content_digest(request.trial, request.scenario, request.mesh))
 
@@ -113,6 +150,7 @@ class RecorderService:
         """Flush what is due, and close when the log is complete."""
         if self._file is None:
             return None
+        self._say_if_behind()
         now_s = time.monotonic()
         if now_s >= self._flush_at_s:
             try:
@@ -133,6 +171,16 @@ class RecorderService:
             self._finish("closed")
             return None
         return QUIET_S
+
+    def _say_if_behind(self) -> None:
+        """Say when too much waits to be written, and when little does again."""
+        waiting = self._host.waiting
+        if not self._is_behind and waiting > BEHIND:
+            self._is_behind = True
+            self._publish("behind", reason=f"{waiting} messages wait to be written")
+        elif self._is_behind and waiting < BEHIND // 10:
+            self._is_behind = False
+            self._publish("recording")
 
     def close(self) -> None:
         """Write what is still queued and finish the file; the process ends."""

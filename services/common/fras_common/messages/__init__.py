@@ -44,6 +44,7 @@ from fras_common.messages.recorder import (
     LastReply,
     LastRequest,
     OpenRequest,
+    RecorderEvent,
     RecorderStatus,
 )
 from fras_common.messages.robot import ActionState, ArmState, RobotState
@@ -107,6 +108,7 @@ __all__ = [
     "PlannedAction",
     "Pose",
     "Quaternion",
+    "RecorderEvent",
     "RecorderStatus",
     "ResetReply",
     "ResetRequest",

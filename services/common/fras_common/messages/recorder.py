@@ -43,11 +43,38 @@ class CloseReply(Wire, frozen=True, kw_only=True):
     lost: int
 
 
-LogState = Literal["idle", "recording", "closed", "error"]
+EventKind = Literal["present", "absent", "gap"]
+
+
+class RecorderEvent(Header, frozen=True, kw_only=True):
+    """What the recorder saw that is no message: it is one so that it stands in the log.
+
+    Attributes
+    ----------
+    kind : {"present", "absent", "gap"}
+        A liveliness token came or went; messages of a publisher never arrived.
+    subject : str
+        The token (`ready/sim/3f2a`), or key and publisher of what is missing.
+    count : int
+        Messages missing; 0 for tokens.
+    """
+
+    kind: EventKind
+    subject: str
+    count: int
+
+
+LogState = Literal["idle", "recording", "behind", "closed", "error"]
 
 
 class RecorderStatus(Header, frozen=True, kw_only=True):
-    """State of the log; latched."""
+    """State of the log; latched.
+
+    Attributes
+    ----------
+    state : {"idle", "recording", "behind", "closed", "error"}
+        `behind`: so much waits to be written that motion must wait, too.
+    """
 
     state: LogState
     path: str

@@ -194,11 +194,14 @@ class RunSection(Section, frozen=True, kw_only=True):
         Motion aborts the trial when a peer has not answered for so long.
     hold_timeout_s : float
         A hold that nobody lifts ends the trial; 0 = it waits for ever.
+    require_log : bool
+        Nothing moves that is not recorded.
     """
 
     pace: Annotated[float, Meta(ge=0, le=1000)] = 1.0
     peer_timeout_s: Annotated[float, Meta(gt=0, le=600)] = 10.0
     hold_timeout_s: Annotated[float, Meta(ge=0, le=86400)] = 30.0
+    require_log: bool = True
 
 
 class Scenario(Section, frozen=True, kw_only=True):

@@ -184,6 +184,11 @@ class ServiceHost:
             return
         self._inbox.put(job)
 
+    @property
+    def waiting(self) -> int:
+        """Jobs in the inbox."""
+        return self._inbox.qsize()
+
     def enter_trial(self, trial: str) -> None:
         """Begin a trial: what arrived for it too early is handled next, in order."""
         self.tick = -1
@@ -253,7 +258,7 @@ class ServiceHost:
             malformed=self.counts["malformed"],
             refused=self.counts["refused"],
             wrong_trial=self.gate.dropped,
-            queue_depth=self._inbox.qsize(),
+            queue_depth=self.waiting,
             queue_dropped=self.counts["queue_dropped"],
             gaps=self.counts["gaps"],
             facts=dict(self.facts),

@@ -1,0 +1,63 @@
+"""Nothing moves that is not recorded: motion's own hold while the log can't keep up or is away."""
+
+from fras_common.messages import RecorderStatus
+from fras_common.service import ServiceHost
+from fras_common.topics import RECORDER_STATUS
+from fras_motion.holds import Holds
+
+__all__ = ["HOLDER", "LogWatch"]
+
+HOLDER = "recorder"
+
+
+class LogWatch:
+    """Holds the arms of a trial that demands a log while that log is not being written.
+
+    Parameters
+    ----------
+    host : ServiceHost
+    holds : Holds
+    """
+
+    def __init__(self, host: ServiceHost, holds: Holds) -> None:
+        self._host = host
+        self._holds = holds
+        self._required_by = ""
+        self._heard = False
+        self._status = RecorderStatus(
+            state="idle", path="", messages=0, bytes=0, lost=0, reason="", trial=""
+        )
+        host.subscribe(RECORDER_STATUS, self._on_status)
+
+    def begin(self, trial: str, *, required: bool) -> None:
+        """Watch the log of a trial from now on, if it demands one."""
+        self._required_by = trial if required else ""
+        # It was opened before motion was reset, but keys have no order among each other.
+        self._heard = False
+
+    def end(self) -> None:
+        """Watch no more: the trial is over."""
+        self._required_by = ""
+
+    def _on_status(self, status: RecorderStatus) -> None:
+        self._status = status
+        self._heard = self._heard or status.trial == self._required_by
+
+    def wake(self) -> None:
+        """Hold, or lift the hold, as it stands now."""
+        problem = self._problem() if self._required_by else ""
+        held = self._holds.current().get(HOLDER)
+        if problem and held is None:
+            self._holds.hold(HOLDER, problem)
+        elif not problem and held is not None:
+            self._holds.resume(HOLDER, by=HOLDER)
+
+    def _problem(self) -> str:
+        status = self._status
+        if not self._heard:
+            return ""
+        if not self._host.present("alive/recorder"):
+            return "the recorder is away"
+        if status.trial != self._required_by or status.state != "recording":
+            return f"the log is {status.state} {status.reason}".rstrip()
+        return ""
