@@ -95,6 +95,7 @@ class World:
             reason=request.reason,
             criterion="weighted",
             goal="visible",
+            asp_digest="",
             ignore_ap=request.ignore_ap,
             tried=list(request.tried),
             actions=[] if isinstance(content, NoPlan) else content,

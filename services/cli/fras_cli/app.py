@@ -256,6 +256,34 @@ def report(
     print_summary(_console(), summary, [("report", str(folder / "report.html"))])
 
 
+@app.command()
+def audit(
+    log: Annotated[Path, typer.Argument(help="An audit log, or a run's folder.")],
+    only: Annotated[
+        str | None,
+        typer.Option(help="Some services: sa, planner, motion, sim.", metavar="SERVICE,..."),
+    ] = None,
+    asp_dir: Annotated[
+        Path | None,
+        typer.Option(help="Instead: what would these rules, laid out like asp/, have decided?"),
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+) -> None:
+    """Derive every decision and state of a log again, and compare; 0 only if all are equal."""
+    from fras_common.threads import one_thread
+
+    # As in the services, before any numerical library: sums in their order, to the last bit.
+    one_thread()
+    from fras_cli.audit import audit, other_rules
+
+    path = _log_file(log)
+    if asp_dir is not None:
+        status = other_rules(path, asp_dir, as_json=json, console=Console())
+    else:
+        status = audit(path, only, as_json=json, console=Console())
+    raise typer.Exit(status)
+
+
 @app.command(context_settings=SERVICE_ARGUMENTS)
 def bench(
     context: typer.Context,

@@ -1,5 +1,6 @@
 """Exit status of a command that ended in a known error."""
 
+from fras_cli.audit import UnknownService
 from fras_cli.keep import DownTimeout
 from fras_cli.log_export import NoFormat
 from fras_cli.run import (
@@ -41,6 +42,7 @@ BAD_INPUT = (
     OutputIsLog,
     OutputUnwritable,
     ScenarioError,
+    UnknownService,
 )
 STACK_ERRORS = (
     CommandNotFound,

@@ -69,6 +69,7 @@ class PlanMaker:
             reason=request.reason,
             criterion=self._section.criterion,
             goal=self._section.goal,
+            asp_digest=self._knowledge.digest,
             ignore_ap=request.ignore_ap,
             tried=list(request.tried),
             actions=_actions(plan),

@@ -262,6 +262,7 @@ def plan(tick: int, reason: str, names: tuple[str, ...]) -> Plan:
         reason=reason,
         criterion="weighted",
         goal="visible",
+        asp_digest="",
         ignore_ap=False,
         tried=[],
         actions=actions,

@@ -34,12 +34,19 @@ class NoPlan(Wire, frozen=True, kw_only=True):
 
 
 class Plan(Header, frozen=True, kw_only=True):
-    """A plan with everything that went into it and the reasons for it."""
+    """A plan with everything that went into it and the reasons for it.
+
+    Attributes
+    ----------
+    asp_digest : str
+        SHA-256 over the rule files that made it.
+    """
 
     request_id: str
     reason: str
     criterion: str
     goal: str
+    asp_digest: str
     ignore_ap: bool
     tried: list[str]
     actions: list[PlannedAction]

@@ -19,6 +19,7 @@ from fras_common.codec import MalformedMessage, encode
 from fras_common.errors import FrasError
 from fras_common.messages import Fault, FaultRecord, Header, Health, LogRecord, RpcRecord
 from fras_common.messages.service import NIL
+from fras_common.service.build import build_of_this_process
 from fras_common.service.gate import TrialGate
 from fras_common.service.health import ProcessMeter
 from fras_common.topics import FAULT, HEALTH, LOG, RPC, Qos, Query, Topic, topic_of
@@ -95,7 +96,7 @@ class ServiceHost:
         self.name = name
         self.gate = TrialGate(self._on_drop)
         self.log: structlog.stdlib.BoundLogger = structlog.get_logger(service=name)
-        self.facts: dict[str, str] = {}
+        self.facts: dict[str, str] = {"build": build_of_this_process()}
         self.waiting_for = ""
         self.counts: Counter[str] = Counter()
         self.refusals: Counter[str] = Counter()

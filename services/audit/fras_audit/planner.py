@@ -1,0 +1,118 @@
+"""The planner again: each plan from its context, each answer to why not, each step of the loop."""
+
+import time
+
+import msgspec
+
+from fras_audit.builds import rounding
+from fras_audit.comparison import Tally
+from fras_audit.executive import audit_executive
+from fras_audit.progress import Progress
+from fras_audit.recorded import Recorded, reply_of, request_of
+from fras_common.errors import FrasError
+from fras_common.messages import Context, Plan, RpcRecord
+from fras_common.topics import CONTEXT, PLAN, WHY_NOT
+from fras_planner.adapter import PlanMaker
+from fras_planner.executive import PlanRequest
+from fras_planner.knowledge import load_knowledge
+from fras_planner.planning import Knowledge
+
+# A search that the clock ended, or the number of conflicts allowed, says so in its core.
+BY_THE_CLOCK = "search_time"
+
+
+def audit(recorded: Recorded, progress: Progress) -> list[Tally]:
+    """Derive plans, answers, and what the executive asked and said.
+
+    Returns
+    -------
+    list of Tally
+        Plans, answers, questions, statuses.
+    """
+    knowledge = load_knowledge()
+    return [
+        *audit_plans(recorded, knowledge, progress),
+        *audit_executive(recorded, knowledge),
+    ]
+
+
+def context_of(recorded: Recorded, plan: Plan) -> Context | None:
+    """Return the context that a plan was made from; None if the log does not hold it."""
+    for context in recorded.of(CONTEXT):
+        if (context.request_id, context.tick) == (plan.request_id, plan.tick):
+            return context
+    return None
+
+
+def request_for(plan: Plan) -> PlanRequest:
+    """Return what else a plan was made from."""
+    return PlanRequest(
+        request_id=plan.request_id,
+        reason=plan.reason,
+        ignore_ap=plan.ignore_ap,
+        tried=tuple(plan.tried),
+    )
+
+
+def audit_plans(recorded: Recorded, knowledge: Knowledge, progress: Progress) -> list[Tally]:
+    """Derive plans and answers, in the order in which one solver gave them.
+
+    That order counts: what the solver learnt from one question stays for the next.
+    """
+    tolerance = rounding(recorded, "planner")
+    questions = [one for one in recorded.mirrors(WHY_NOT) if one.fault is None]
+    plans = Tally("planner", "plans", len(recorded.of(PLAN)), tolerance)
+    answers = Tally("planner", "answers to why not", len(questions), tolerance)
+    _note_other_rules(recorded, knowledge, plans)
+    maker = PlanMaker(knowledge, recorded.scenario, time.perf_counter)
+    said = sorted([*recorded.of(PLAN), *questions], key=lambda one: one.stamp_ns)
+    for number, one in enumerate(said, start=1):
+        if isinstance(one, Plan):
+            _audit_plan(one, maker, recorded, plans)
+        else:
+            _audit_answer(one, maker, answers)
+        progress("planner", number, len(said))
+    return [plans, answers]
+
+
+def _note_other_rules(recorded: Recorded, knowledge: Knowledge, plans: Tally) -> None:
+    others = sorted({one.asp_digest for one in recorded.of(PLAN)} - {knowledge.digest})
+    if others:
+        named = ", ".join(digest[:12] for digest in others)
+        plans.notes.append(
+            f"planned by other rules (digest {named}) than those at hand "
+            f"({knowledge.digest[:12]}): --asp-dir compares decisions"
+        )
+
+
+def _audit_plan(plan: Plan, maker: PlanMaker, recorded: Recorded, plans: Tally) -> None:
+    where = f"plan for {plan.request_id} at tick {plan.tick}"
+    context = context_of(recorded, plan)
+    if context is None:
+        plans.notes.append(f"{where}: its context is not in the log")
+        return
+    if plan.no_plan is not None and BY_THE_CLOCK in plan.no_plan.core:
+        plans.notes.append(f"{where}: the time allowed was over, which no audit can derive")
+        return
+    try:
+        derived = maker(context, request_for(plan))
+    except FrasError as error:
+        plans.surplus(where, f"a plan; refused again: {error}", plan.seq)
+        return
+    plans.compare_messages(where, _untimed(plan), _untimed(derived))
+
+
+def _audit_answer(mirror: RpcRecord, maker: PlanMaker, answers: Tally) -> None:
+    question = request_of(WHY_NOT, mirror).question
+    where = f"why not {question}"
+    try:
+        derived = maker.why_not(question)
+    except FrasError as error:
+        answers.surplus(where, f"an answer; refused again: {error}", mirror.seq)
+        return
+    answers.compare(where, reply_of(WHY_NOT, mirror), derived, mirror.seq)
+
+
+def _untimed(plan: Plan) -> Plan:
+    """Return a plan without the wall-clock times that it took."""
+    return msgspec.structs.replace(plan, ground_s=0.0, solve_s=0.0)
