@@ -221,9 +221,10 @@ def _operating_state(said: RobotState) -> Callable[[str], str]:
     Clients enable and disable arms, and a hold is told there before the loop has imposed it, so
     the recorded state stands, but for an arm that is held and said to be enabled.
     """
+    held = said.holds.keys() - {CANCELLER}
 
     def told(arm: str) -> str:
         state = said.arms[arm].operating_state if arm in said.arms else "DISABLED"
-        return "PAUSED" if said.holds and state == "ENABLED" else state
+        return "PAUSED" if held and state == "ENABLED" else state
 
     return told

@@ -116,7 +116,7 @@ class _Audit:
                 continue
             self._contexts.compare_messages(where, told, derived)
             if unstamped(answer) != unstamped(told):
-                self._contexts.surplus(f"{where}, as answered", "another than was published")
+                self._contexts.compare_messages(f"{where}, as answered", answer, derived)
 
     def _aim(self, watched: WatchedTrial, tick: int) -> None:
         """Answer again what was asked at this tick."""
