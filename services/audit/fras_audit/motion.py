@@ -1,6 +1,6 @@
 """Motion again: each robot state, each result, each goal accepted or refused."""
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable
 
 from fras_audit.builds import rounding
@@ -26,7 +26,14 @@ from fras_common.topics import (
     VERDICT,
 )
 from fras_motion import states as core
-from fras_motion.adapter import action_result, goal_of, parameters_of, robot_state, verdict_of
+from fras_motion.adapter import (
+    action_result,
+    goal_of,
+    in_words,
+    parameters_of,
+    robot_state,
+    verdict_of,
+)
 from fras_motion.errors import Refused
 from fras_motion.holds import Holds
 from fras_motion.trial import CANCELLER, MotionTrial
@@ -87,7 +94,7 @@ class _Audit:
                 "as recorded, what was sent to them is derived"
             )
         parameters = parameters_of(reset.scenario)
-        trial = MotionTrial(self._recorded.trial, parameters, self._holds, drivers=self._drivers)
+        trial = MotionTrial(self._recorded.trial, parameters, self._holds, Counter(), self._drivers)
         try:
             for number, said in enumerate(self._said, start=1):
                 self._go_on(trial, said)
@@ -123,7 +130,7 @@ class _Audit:
             for driver in self._drivers.values():
                 driver.load(said, fault)
         try:
-            advance = trial.controller.advance(verdict_of(verdict))
+            advance = trial.advance(verdict_of(verdict))
         except FrasError as error:
             self._states.surplus(f"tick {said.tick}", f"a tick; none was due: {error}", said.seq)
             raise _Lost(f"not derived after tick {trial.tick}") from error
@@ -161,7 +168,12 @@ class _Audit:
         try:
             trial.execute(request.trial, goal_of(request))
         except Refused as error:
-            derived = ExecuteReply(accepted=False, reason=error.reason)
+            derived = ExecuteReply(
+                accepted=False,
+                reason=error.reason,
+                text=str(error),
+                values=in_words(error.values),
+            )
         where = f"goal {request.goal_id}, {request.name} of {request.arm}"
         if not self._goals.compare(where, reply, derived, mirror.seq):
             raise _Lost(f"not derived from goal {request.goal_id} on: it was answered otherwise")

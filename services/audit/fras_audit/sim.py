@@ -16,10 +16,11 @@ from fras_common.topics import ROBOT_STATE, SIM_CHECKPOINT, SIM_RESET, TISSUE_MO
 from fras_sim.fem import compile_kernels
 from fras_sim.trial import Step, TissueTrial
 
-# What another build, processor or linear solver may differ by; see docs/audit.md.
-POSITION_M = 1e-6
-FORCE_N = 1e-3
-SPEED_M_S = 1e-4
+# What another build, processor or linear solver may differ by within ten ticks: three to six times
+# what other solvers did (docs/audit.md).
+POSITION_M = 2e-4
+FORCE_N = 5e-4
+SPEED_M_S = 5e-3
 ELSEWHERE = Tolerance(
     1e-9,
     {
@@ -93,6 +94,9 @@ def _follow(
         if (step := _step(trial, robot)) is not None:
             _compare(step, robot, said, states, whole=not recorded.damage)
             _compare_checkpoint(step, kept, checkpoints)
+            if states.tolerance is not None and robot.tick in kept:
+                # On another build each ten ticks begin as recorded, so that nothing adds up.
+                trial.restore(kept[robot.tick][0])
         progress("sim", number, len(robots))
     _beyond(trial, said, states)
 

@@ -10,6 +10,7 @@ from fras_common.scenario import Scenario
 from fras_sim.adapter import (
     build_simulator,
     checkpoint_message,
+    checkpoint_of,
     tissue_model,
     tissue_state,
     tools_of,
@@ -78,6 +79,16 @@ class TissueTrial:
     def model(self) -> TissueModel:
         """Describe the tissue at rest."""
         return tissue_model(self._simulator, self._scenario, self._trial)
+
+    def restore(self, checkpoint: SimCheckpoint) -> None:
+        """Go on from a checkpoint of this trial, its tick the last one answered.
+
+        Raises
+        ------
+        BadParameter
+            If it belongs to another mesh.
+        """
+        self._simulator.restore(checkpoint_of(checkpoint))
 
     def follow(self, robot: RobotState) -> Step | None:
         """Move on to the robot's tick; the same tick again gets the same answer again.
