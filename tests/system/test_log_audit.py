@@ -1,6 +1,8 @@
 """Real trials derived again from their logs; and logs that lie, at the place where they do."""
 
 import hashlib
+import io
+import json
 import math
 import shutil
 from collections.abc import Callable
@@ -9,10 +11,14 @@ from typing import Any
 
 import msgspec
 import pytest
+from rich.console import Console
 
 from fras_audit import SERVICES, Report, Tally, audit_log
 from fras_audit.decisions import decide_by
 from fras_audit.reading import read_recorded
+from fras_audit.recorded import reply_of
+from fras_cli.audit import UnknownService, audit, other_rules
+from fras_cli.failures import exit_status
 from fras_cli.trial import TrialView
 from fras_common.codec import encode
 from fras_common.messages import (
@@ -33,7 +39,16 @@ from fras_common.messages import (
     Verdict,
     WhyNotRequest,
 )
-from fras_common.topics import HOLD, RESUME, TASK, WHY_NOT
+from fras_common.topics import (
+    EXECUTE,
+    HOLD,
+    RESUME,
+    ROBOT_STATE,
+    TASK,
+    TASK_STATUS,
+    VERDICT,
+    WHY_NOT,
+)
 from support.forging import Change, rewrite
 
 ROOT = Path(__file__).parents[2]
@@ -47,6 +62,13 @@ insertion_noise_m = 1e-6
 joint_delay_s = 0.03
 [tissue]
 node_counts = [11, 13, 2]
+"""
+# A box over the block that scenario a grasps first: motion refuses it, and another is tried.
+BOXED = """\
+seed = 2
+[[motion.forbidden_boxes]]
+lower_m = [0.085, 0.085, -0.01]
+upper_m = [0.1, 0.105, 0.02]
 """
 IMPATIENT = "seed = 2\n[run]\nhold_timeout_s = 0.5\n"
 TIGHT = "seed = 20\n[awareness]\nhard_limit_n = 0.5\nvisible_fraction = 0.995\n"
@@ -121,7 +143,7 @@ def ask_why_not(bus: Any) -> Look:
 def logs(trials: Any, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Trials of each kind, and of each way to end or to be disturbed."""
     folder = tmp_path_factory.mktemp("scenarios")
-    written = {"noisy": NOISY, "impatient": IMPATIENT, "tight": TIGHT}
+    written = {"noisy": NOISY, "impatient": IMPATIENT, "tight": TIGHT, "boxed": BOXED}
     for name, text in written.items():
         (folder / f"{name}.toml").write_text(text)
     bus = trials.stack.link.bus
@@ -136,6 +158,7 @@ def logs(trials: Any, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Pat
         "hard": trials.run(str(folder / "tight.toml"))[1],
         "held": trials.run("a", hold_and_lift(bus))[1],
         "aborted": trials.run("a", abort(bus))[1],
+        "refused": trials.run(str(folder / "boxed.toml"))[1],
         "noisy": trials.run(str(folder / "noisy.toml"))[1],
         "given_up": trials.run(str(folder / "impatient.toml"), press)[1],
     }
@@ -144,7 +167,10 @@ def logs(trials: Any, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Pat
 
 
 PER_TICK = ("verdicts", "robot states", "states")
-KINDS = ["exposed", "crossed", "released", "hard", "held", "aborted", "noisy", "given_up"]
+KINDS = [
+    *("exposed", "crossed", "released", "hard", "held"),
+    *("aborted", "refused", "noisy", "given_up"),
+]
 
 
 @pytest.mark.parametrize("name", KINDS)
@@ -161,18 +187,18 @@ def test_the_logs_hold_what_they_are_for(logs: dict[str, Path]) -> None:
     recorded = {name: read_recorded(log) for name, log in logs.items()}
 
     def end(name: str) -> TaskStatus:
-        from fras_common.topics import TASK_STATUS
-
         return [one for one in recorded[name].of(TASK_STATUS) if one.phase == "ended"][-1]
 
     assert [end(name).scenario_kind for name in ("exposed", "crossed", "released")] == list("ABC")
     assert (end("aborted").outcome, end("aborted").reason) == ("aborted", "enough")
     assert (end("given_up").outcome, end("given_up").reason) == ("aborted", "hold:cli:test")
     assert len(recorded["exposed"].mirrors(WHY_NOT)) == 2
-    from fras_common.topics import ROBOT_STATE, VERDICT
-
     assert any(one.holds for one in recorded["held"].of(ROBOT_STATE))
     assert "hard" in {one.level for one in recorded["hard"].of(VERDICT)}
+    answers = [reply_of(EXECUTE, one) for one in recorded["refused"].mirrors(EXECUTE)]
+    assert not answers[0].accepted
+    assert answers[0].values
+    assert answers[-1].accepted
 
 
 # --- logs that lie ------------------------------------------------------------------------
@@ -210,6 +236,11 @@ def setpoint(state: RobotState) -> RobotState:
     joints = (*arm.setpoint_joints[:2], arm.setpoint_joints[2] + 1e-12, *arm.setpoint_joints[3:])
     moved = msgspec.structs.replace(arm, setpoint_joints=joints)
     return msgspec.structs.replace(state, arms={**state.arms, "psm1": moved})
+
+
+def held_by_nobody(state: RobotState) -> RobotState:
+    """Nobody asked for it: no message of motion's tells this hold."""
+    return msgspec.structs.replace(state, holds={"page": "stop"})
 
 
 def moved(array: Array, row: int, by: float) -> Array:
@@ -310,6 +341,15 @@ def test_an_answer_to_a_goal_that_motion_did_not_give(
     assert first is not None
     assert (first.path, first.recorded, first.derived) == ("accepted", False, True)
     assert any("answered otherwise" in note for note in tally_of(report, "robot states").notes)
+
+
+def test_a_hold_that_nobody_asked_for(logs: dict[str, Path], tmp_path: Path) -> None:
+    forged = at_tick(55, held_by_nobody)
+    log = rewrite(logs["crossed"], tmp_path / "forged.mcap", "robot/state", forged)
+    tally = tally_of(audited(log, "motion"), "holds shown")
+    assert tally.differences == 1
+    assert tally.first is not None
+    assert (tally.first.where, tally.first.path) == ("tick 55", "page")
 
 
 def test_a_state_left_out_is_told_and_what_follows_is_not_derived(
@@ -435,3 +475,75 @@ def test_plans_of_other_rules_are_told(logs: dict[str, Path], tmp_path: Path) ->
     assert plans.first is not None
     assert plans.first.path == "asp_digest"
     assert any("by other rules (digest 0123456789ab)" in note for note in plans.notes)
+
+
+# --- as `fras audit` tells it ----------------------------------------------------------------
+
+
+def told(run: Callable[[Console], int]) -> tuple[int, str]:
+    text = io.StringIO()
+    status = run(Console(file=text, width=160))
+    return status, text.getvalue()
+
+
+def test_the_command_ends_with_0_where_all_is_equal(logs: dict[str, Path]) -> None:
+    status, text = told(
+        lambda console: audit(logs["crossed"], "sa,planner", as_json=False, console=console)
+    )
+    assert status == 0
+    assert "all equal" in text
+    assert "motion" not in text
+
+
+def test_the_command_shows_both_values_side_by_side(logs: dict[str, Path], tmp_path: Path) -> None:
+    log = rewrite(logs["crossed"], tmp_path / "1.mcap", "sa/verdict", at_tick(70, level))
+    status, text = told(lambda console: audit(log, "sa", as_json=False, console=console))
+    assert status == 1
+    assert "sa, verdicts: first difference in tick 70" in text
+    assert text.index("recorded  soft") < text.index("derived   ok")
+    assert "1 differ." in text
+
+
+def test_the_command_as_json(
+    logs: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = rewrite(logs["crossed"], tmp_path / "1.mcap", "robot/state", at_tick(50, setpoint))
+    status, _ = told(lambda console: audit(log, "motion", as_json=True, console=console))
+    found = json.loads(capsys.readouterr().out)
+    assert (status, found["passed"]) == (1, False)
+    (states,) = [one for one in found["tallies"] if one["what"] == "robot states"]
+    assert states["differences"] == 1
+    assert states["first_difference"]["field"] == "arms.psm1.setpoint_joints[2]"
+
+
+def test_the_command_tells_a_log_that_is_cut(logs: dict[str, Path], tmp_path: Path) -> None:
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(logs["crossed"].read_bytes()[:-2000])
+    status, text = told(lambda console: audit(cut, "planner", as_json=False, console=console))
+    assert status == 1
+    assert "The log is cut" in text
+
+
+def test_the_command_refuses_what_is_no_service(logs: dict[str, Path]) -> None:
+    with pytest.raises(UnknownService, match="sa, planner, motion, sim") as caught:
+        audit(logs["crossed"], "sa,recorder", as_json=False, console=Console(file=io.StringIO()))
+    assert exit_status(caught.value) == 2
+
+
+def test_the_command_tells_what_other_rules_would_have_decided(
+    logs: dict[str, Path], tmp_path: Path
+) -> None:
+    rules = tmp_path / "rules"
+    shutil.copytree(ROOT / "asp", rules)
+    shutil.copy(rules / "preferences" / "nearest.lp", rules / "preferences" / "weighted.lp")
+    status, text = told(
+        lambda console: other_rules(logs["crossed"], rules, as_json=False, console=console)
+    )
+    assert status == 0
+    assert "3 decisions asked for again" in text
+    (rules / "goal.lp").write_text("goal(")
+    status, text = told(
+        lambda console: other_rules(logs["crossed"], rules, as_json=False, console=console)
+    )
+    assert status == 2
+    assert "goal.lp" in text

@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 from fras_audit.builds import rounding
 from fras_audit.comparison import Tally, unstamped
+from fras_audit.holds import audit_holds
 from fras_audit.playback import playback_drivers
 from fras_audit.progress import Progress
 from fras_audit.recorded import Recorded, reply_of, request_of
@@ -56,9 +57,9 @@ def audit(recorded: Recorded, progress: Progress) -> list[Tally]:
     Returns
     -------
     list of Tally
-        Robot states, results, goals.
+        Robot states, results, goals, holds.
     """
-    return _Audit(recorded).run(progress)
+    return [*_Audit(recorded).run(progress), audit_holds(recorded)]
 
 
 class _Audit:

@@ -26,9 +26,11 @@ READ: tuple[Topic[Any], ...] = (
     t.PLAN,
     t.TASK_STATUS,
     t.ACTION_RESULT,
+    t.HOLDS,
     t.RECORDER_STATUS,
 )
 _READ = {topic.key: topic for topic in READ}
+_QUERIES = {query.key: query for query in t.QUERIES}
 _RPC_PREFIX = t.RPC.key.partition("{")[0]
 _HEALTH_PREFIX = t.HEALTH.key.partition("{")[0]
 # Whose name stands here says who drives the arms.
@@ -115,7 +117,8 @@ class Recorded:
         self._note_gap(key, header.source, header.seq)
         if key == _DRIVER_KEY:
             self.arms_by = header.source.partition("/")[0]
-        elif header.trial == self.trial:
+        elif header.trial == self.trial or key == t.HOLDS.key:
+            # Holds are of no trial: they outlive each.
             self._keep(message)
 
     def _keep(self, message: RawMessage) -> None:
@@ -124,6 +127,12 @@ class Recorded:
             self._messages[message.key].append(decode(topic.type, message.payload, message.key))
             return
         mirror = decode(m.RpcRecord, message.payload, message.key)
+        query = _QUERIES.get(mirror.key)
+        if query is None or query.mirror != message.key:
+            raise MalformedMessage(message.key, "$.key", f"mirrors {mirror.key!r}")
+        request_of(query, mirror)
+        if mirror.fault is None:
+            reply_of(query, mirror)
         self._mirrors[mirror.key].append(mirror)
 
     def _note_gap(self, key: str, source: str, seq: int) -> None:

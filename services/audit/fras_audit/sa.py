@@ -122,7 +122,10 @@ class _Audit:
         """Answer again what was asked at this tick."""
         for place, (ticks, request, reply, seq) in enumerate(self._asked):
             if tick in ticks:
-                derived = watched.target(request)
+                try:
+                    derived = watched.target(request)
+                except FrasError:
+                    continue
                 # A question may have come between two ticks: then either may be its moment.
                 if tick < ticks[-1] and derived != reply:
                     continue

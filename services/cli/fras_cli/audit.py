@@ -152,7 +152,7 @@ def other_rules(path: Path, asp_dir: Path, *, as_json: bool, console: Console) -
     int
         0: it is a question, whatever the answer; 2 if the rules can't be used.
     """
-    with require_extra("planner"):
+    with require_extra("audit"):
         reading = importlib.import_module("fras_audit.reading")
         decisions = importlib.import_module("fras_audit.decisions")
     recorded = reading.read_recorded(path)
