@@ -5,10 +5,12 @@ import threading
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from fras_common.messages import LogRecord, Verdict
 from fras_common.service import ServiceHost
+from fras_common.service.build import build_of_this_process
 from fras_common.service.health import ProcessMeter
 from fras_common.topics import HEALTH, LOG, VERDICT
 
@@ -94,7 +96,11 @@ def test_health_tells_what_the_service_does(bench: Any):
     health = host.health(meter)
     assert (health.service, health.state, health.tick) == ("sim", "ready", 12)
     assert (health.published, health.trial) == (1, "t-1")
-    assert health.facts == {"linear_solver": "block tridiagonal"}
+    assert health.facts == {
+        "build": build_of_this_process(),
+        "linear_solver": "block tridiagonal",
+    }
+    assert f"numpy {np.__version__}; " in health.facts["build"]
     pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
     assert health.rss_bytes == pytest.approx(pages * os.sysconf("SC_PAGE_SIZE"), rel=0.2)
     assert health.cpu_percent >= 0.0
