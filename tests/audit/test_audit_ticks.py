@@ -1,15 +1,23 @@
 """At which tick a question was answered that does not say so; and what was held then."""
 
+import msgspec
 import pytest
 
 from fras_audit.holds import audit_holds
 from fras_audit.recorded import Recorded
 from fras_audit.ticks import ticks_while
 from fras_common.codec import encode
-from fras_common.messages import Header, Holds, RobotState, RpcRecord
+from fras_common.messages import (
+    Header,
+    Holds,
+    RobotState,
+    RpcRecord,
+    TargetReply,
+    TargetRequest,
+)
 from fras_common.messages.service import NIL
 from fras_common.scenario import Scenario
-from fras_common.topics import HOLDS, ROBOT_STATE
+from fras_common.topics import HOLDS, ROBOT_STATE, SA_TARGET
 from fras_log import RawMessage
 
 MS = 1_000_000
@@ -97,11 +105,20 @@ def test_motions_own_hold_is_not_looked_for() -> None:
     assert differing(shown(0, 10), shown(1, 20, cancel="the trial has ended")) == []
 
 
-def test_a_mirror_that_says_another_key_than_its_own_is_not_understood() -> None:
-    recorded = Recorded("log", "t", {}, Scenario())
-    wrong = RpcRecord(
-        trial="t", key="sa/context", request=NIL, reply=NIL, fault=None, duration_s=0.0
+def test_a_mirror_that_does_not_fit_its_key_is_not_understood() -> None:
+    request = TargetRequest(trial="t", action="reach", arm="psm1", block="b(1,1)")
+    mirror = RpcRecord(
+        trial="t",
+        key="sa/target",
+        request=msgspec.Raw(encode(request)),
+        reply=msgspec.Raw(encode(TargetReply(position_m=None))),
+        fault=None,
+        duration_s=0.0,
     )
-    recorded.take(RawMessage("rpc/motion/execute", encode(wrong)))
-    recorded.take(RawMessage("rpc/sa/context", encode(wrong)))
-    assert recorded.malformed == 2
+    recorded = Recorded("log", "t", {}, Scenario())
+    for key in ("rpc/motion/execute", "rpc/sa/context"):
+        recorded.take(RawMessage(key, encode(mirror)))
+    recorded.take(RawMessage("rpc/sa/target", encode(msgspec.structs.replace(mirror, reply=NIL))))
+    assert recorded.malformed == 3
+    recorded.take(RawMessage("rpc/sa/target", encode(mirror)))
+    assert (recorded.malformed, len(recorded.mirrors(SA_TARGET))) == (3, 1)

@@ -25,6 +25,8 @@ from fras_common.messages import (
     ActionResult,
     Array,
     Context,
+    ContextRequest,
+    ExecuteRequest,
     Health,
     HoldRequest,
     JointState,
@@ -33,6 +35,7 @@ from fras_common.messages import (
     RobotState,
     RpcRecord,
     SimCheckpoint,
+    TargetRequest,
     TaskRequest,
     TaskStatus,
     TissueState,
@@ -44,6 +47,8 @@ from fras_common.topics import (
     HOLD,
     RESUME,
     ROBOT_STATE,
+    SA_CONTEXT,
+    SA_TARGET,
     TASK,
     TASK_STATUS,
     VERDICT,
@@ -139,6 +144,23 @@ def ask_why_not(bus: Any) -> Look:
     return once(lambda view: in_phase(view, "traverse"), ask)
 
 
+def visit(bus: Any) -> Look:
+    """Ask what the executive asks, too, in the middle of its action."""
+
+    def ask(view: TrialView) -> None:
+        assert view.robot is not None
+        trial, tick = view.robot.trial, view.robot.tick
+        context = ContextRequest(trial=trial, request_id="visitor", min_tick=tick, expected=[])
+        assert bus.query(SA_CONTEXT, context, 5.0).tick >= tick
+        asked = TargetRequest(trial=trial, action="reach", arm="psm1", block="b(1,1)")
+        target = bus.query(SA_TARGET, asked, 5.0).position_m
+        goal = {"trial": trial, "goal_id": "visitor", "name": "reach", "arm": "psm1"}
+        request = ExecuteRequest(**goal, block="b(1,1)", target_m=target)
+        assert bus.query(EXECUTE, request, 5.0).reason == "busy"
+
+    return once(lambda view: in_phase(view, "traverse"), ask)
+
+
 @pytest.fixture(scope="module")
 def logs(trials: Any, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Trials of each kind, and of each way to end or to be disturbed."""
@@ -153,6 +175,7 @@ def logs(trials: Any, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Pat
     )
     found = {
         "exposed": trials.run("a", ask_why_not(bus))[1],
+        "visited": trials.run("a", visit(bus))[1],
         "crossed": trials.run("b")[1],
         "released": trials.run("c")[1],
         "hard": trials.run(str(folder / "tight.toml"))[1],
@@ -168,7 +191,7 @@ def logs(trials: Any, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Pat
 
 PER_TICK = ("verdicts", "robot states", "states")
 KINDS = [
-    *("exposed", "crossed", "released", "hard", "held"),
+    *("exposed", "visited", "crossed", "released", "hard", "held"),
     *("aborted", "refused", "noisy", "given_up"),
 ]
 

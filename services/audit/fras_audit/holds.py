@@ -1,11 +1,10 @@
 """Whether motion held exactly when it was told to."""
 
 from bisect import bisect_right
-from collections.abc import Sequence
 
 from fras_audit.comparison import Tally
 from fras_audit.recorded import Recorded
-from fras_common.messages import Holds, RobotState
+from fras_common.messages import RobotState
 from fras_common.topics import HOLDS, ROBOT_STATE
 from fras_motion.trial import CANCELLER
 
@@ -21,26 +20,19 @@ def audit_holds(recorded: Recorded) -> Tally:
     said = recorded.of(HOLDS)
     tally = Tally("motion", "holds shown", len(states))
     stamps = [one.stamp_ns for one in said]
-    before: RobotState | None = None
+    # What was held before anything was told stands in the first state.
+    at_first = _of_others(states[0]) if states else {}
+    before_ns = 0
     for state in states:
         shown = _of_others(state)
-        in_force = _in_force(said, stamps, before, state)
+        # One told while a state was on its way may show in it, or in the next one.
+        earliest, latest = bisect_right(stamps, before_ns), bisect_right(stamps, state.stamp_ns)
+        since = [one.holds for one in said[max(0, earliest - 1) : latest]]
+        in_force = since if earliest > 0 else [at_first, *since]
         derived = shown if shown in in_force else in_force[-1]
         tally.compare(f"tick {state.tick}", shown, derived, state.seq)
-        before = state
+        before_ns = state.stamp_ns
     return tally
-
-
-def _in_force(
-    said: Sequence[Holds], stamps: Sequence[int], before: RobotState | None, state: RobotState
-) -> list[dict[str, str]]:
-    """Return what was held since the state before; the last is what is held now."""
-    first = bisect_right(stamps, before.stamp_ns) if before is not None else 0
-    since = [one.holds for one in said[max(0, first - 1) : bisect_right(stamps, state.stamp_ns)]]
-    if first > 0:
-        return since
-    # Nothing had been told before that state: what it showed goes on until something is.
-    return [_of_others(before if before is not None else state), *since]
 
 
 def _of_others(state: RobotState) -> dict[str, str]:
