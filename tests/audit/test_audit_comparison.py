@@ -95,6 +95,12 @@ def test_no_tolerance_admits_what_is_no_matter_of_digits(recorded: Any, derived:
     assert not Tolerance(1e-3).admits("level", recorded, derived)
 
 
+def test_what_is_not_looked_at_is_admitted_whatever_it_is() -> None:
+    tolerance = Tolerance(1e-9, {"solver.refactored": math.inf})
+    assert tolerance.admits("solver.refactored", True, False)
+    assert not tolerance.admits("solver.converged", True, False)
+
+
 def test_what_is_missing_and_what_is_too_much_are_differences() -> None:
     tally = Tally("sa", "verdicts", 1)
     tally.lacks("tick 3", "a verdict")

@@ -6,6 +6,7 @@ import json
 import math
 import shutil
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +55,7 @@ from fras_common.topics import (
     VERDICT,
     WHY_NOT,
 )
+from fras_sim.fem import TissueSimulator
 from support.forging import Change, rewrite
 
 ROOT = Path(__file__).parents[2]
@@ -447,6 +449,20 @@ def test_numbers_of_another_build_may_differ_by_the_tolerance(
     tally = tally_of(audited(log, "sim"), "states")
     assert (tally.tolerated, tally.differences) == (tolerated, differs)
     assert any("another build (another machine)" in note for note in tally.notes)
+
+
+def test_another_linear_solver_stays_within_the_tolerance(
+    logs: dict[str, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        "fras_sim.adapter.TissueSimulator", partial(TissueSimulator, solver="scipy")
+    )
+    report = audited(logs["crossed"], "sim")
+    states = tally_of(report, "states")
+    assert "linear solver scipy-single, derived with scipy" in states.notes[0]
+    assert states.tolerated > 100
+    assert [tally.first for tally in report.tallies if tally.first] == []
+    assert report.passed
 
 
 def test_what_other_arms_measured_is_taken_as_recorded(

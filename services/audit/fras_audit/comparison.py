@@ -51,7 +51,7 @@ class Tolerance:
     otherwise : float
         Absolute, and relative to the larger magnitude, for every field not named.
     fields : mapping of str to float
-        Absolute, by the first part of a field's path; infinite: not looked at.
+        Absolute, by a field's path or the first part of it; infinite: not looked at.
     """
 
     otherwise: float
@@ -59,12 +59,15 @@ class Tolerance:
 
     def admits(self, path: str, recorded: object, derived: object) -> bool:
         """Whether a difference is none."""
+        root = path.partition(".")[0].partition("[")[0]
+        allowed = self.fields.get(path, self.fields.get(root))
+        if allowed is not None and math.isinf(allowed):
+            return True
         if not (_is_number(recorded) and _is_number(derived)):
             return False
         a, b = float(str(recorded)), float(str(derived))
-        allowed = self.fields.get(path.partition(".")[0].partition("[")[0])
         if allowed is not None:
-            return math.isinf(allowed) or abs(a - b) <= allowed
+            return abs(a - b) <= allowed
         return math.isclose(a, b, rel_tol=self.otherwise, abs_tol=self.otherwise)
 
 

@@ -1,15 +1,13 @@
 """What other rules would have decided in the situations that a log records."""
 
-import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from fras_audit.planner import context_of, request_for
+from fras_audit.planner import context_of, maker_of, request_for
 from fras_audit.recorded import Recorded
 from fras_common.errors import FrasError
 from fras_common.messages import Plan
 from fras_common.topics import PLAN
-from fras_planner.adapter import PlanMaker
 from fras_planner.knowledge import load_knowledge
 
 
@@ -72,7 +70,7 @@ def decide_by(recorded: Recorded, asp_dir: Path) -> Decisions:
     knowledge = load_knowledge(asp_dir)
     # Before any plan, so that rules without the trial's criterion are refused as a whole.
     knowledge.preference_file(recorded.scenario.planner.criterion)
-    maker = PlanMaker(knowledge, recorded.scenario, time.perf_counter)
+    maker = maker_of(recorded, knowledge)
     found: list[Decision] = []
     skipped = 0
     for plan in recorded.of(PLAN):

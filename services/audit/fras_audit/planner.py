@@ -19,6 +19,8 @@ from fras_planner.planning import Knowledge
 
 # A search that the clock ended, or the number of conflicts allowed, says so in its core.
 BY_THE_CLOCK = "search_time"
+# Time decides whether there is an answer, never which: a slower machine may take longer.
+PATIENCE_S = 600.0
 
 
 def audit(recorded: Recorded, progress: Progress) -> list[Tally]:
@@ -34,6 +36,13 @@ def audit(recorded: Recorded, progress: Progress) -> list[Tally]:
         *audit_plans(recorded, knowledge, progress),
         *audit_executive(recorded, knowledge),
     ]
+
+
+def maker_of(recorded: Recorded, knowledge: Knowledge) -> PlanMaker:
+    """Make a planner for the trial's scenario that is given all the time it needs."""
+    section = msgspec.structs.replace(recorded.scenario.planner, time_limit_s=PATIENCE_S)
+    scenario = msgspec.structs.replace(recorded.scenario, planner=section)
+    return PlanMaker(knowledge, scenario, time.perf_counter)
 
 
 def context_of(recorded: Recorded, plan: Plan) -> Context | None:
@@ -64,7 +73,7 @@ def audit_plans(recorded: Recorded, knowledge: Knowledge, progress: Progress) ->
     plans = Tally("planner", "plans", len(recorded.of(PLAN)), tolerance)
     answers = Tally("planner", "answers to why not", len(questions), tolerance)
     _note_other_rules(recorded, knowledge, plans)
-    maker = PlanMaker(knowledge, recorded.scenario, time.perf_counter)
+    maker = maker_of(recorded, knowledge)
     said = sorted([*recorded.of(PLAN), *questions], key=lambda one: one.stamp_ns)
     for number, one in enumerate(said, start=1):
         if isinstance(one, Plan):
