@@ -49,6 +49,10 @@ def test_without_a_tick_there_is_none() -> None:
     assert list(ticks_while(mirror(25, 1), [])) == []
 
 
+def raw(key: str, payload: bytes) -> RawMessage:
+    return RawMessage(key, payload, 0)
+
+
 def shown(tick: int, at_ms: int, **holds: str) -> RawMessage:
     state = RobotState(
         tick=tick,
@@ -60,11 +64,11 @@ def shown(tick: int, at_ms: int, **holds: str) -> RawMessage:
         holds=holds,
         verdict_tick=tick - 1,
     )
-    return RawMessage(ROBOT_STATE.key, encode(state))
+    return raw(ROBOT_STATE.key, encode(state))
 
 
 def told(at_ms: int, **holds: str) -> RawMessage:
-    return RawMessage(HOLDS.key, encode(Holds(stamp_ns=at_ms * MS, seq=at_ms, holds=holds)))
+    return raw(HOLDS.key, encode(Holds(stamp_ns=at_ms * MS, seq=at_ms, holds=holds)))
 
 
 def differing(*messages: RawMessage) -> list[str]:
@@ -117,8 +121,8 @@ def test_a_mirror_that_does_not_fit_its_key_is_not_understood() -> None:
     )
     recorded = Recorded("log", "t", {}, Scenario())
     for key in ("rpc/motion/execute", "rpc/sa/context"):
-        recorded.take(RawMessage(key, encode(mirror)))
-    recorded.take(RawMessage("rpc/sa/target", encode(msgspec.structs.replace(mirror, reply=NIL))))
+        recorded.take(raw(key, encode(mirror)))
+    recorded.take(raw("rpc/sa/target", encode(msgspec.structs.replace(mirror, reply=NIL))))
     assert recorded.malformed == 3
-    recorded.take(RawMessage("rpc/sa/target", encode(mirror)))
+    recorded.take(raw("rpc/sa/target", encode(mirror)))
     assert (recorded.malformed, len(recorded.mirrors(SA_TARGET))) == (3, 1)
