@@ -1,12 +1,15 @@
-"""The trial that the reports are tested with, exported."""
+"""The trial that the reports are tested with, exported; a log to be damaged."""
 
 from pathlib import Path
 
 import pytest
+from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 from tests.cli.report import conftest as made
 
 from fras_common.messages import Context
+from fras_log import Signer
 from fras_log.export import Format, export
+from support.damage import Whole, write_log
 
 UNDER_WAY_NS = 777_777
 CELLS = [(i, j) for i in range(1, 8) for j in range(1, 8)]
@@ -50,3 +53,17 @@ def rerun_file(trial_log: Path) -> Path:
     path = trial_log.with_name("trial.rrd")
     export(trial_log, {Format.RERUN: path})
     return path
+
+
+@pytest.fixture(scope="session")
+def signer() -> Signer:
+    """Key of the machine that recorded."""
+    return Signer(Ed25519PrivateKey.generate())
+
+
+@pytest.fixture(scope="session")
+def whole(tmp_path_factory: pytest.TempPathFactory, signer: Signer) -> Whole:
+    """A signed log; tests write what they damage elsewhere."""
+    path = tmp_path_factory.mktemp("whole") / "audit.mcap"
+    write_log(path, signer)
+    return Whole(path.read_bytes())

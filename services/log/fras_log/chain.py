@@ -1,10 +1,10 @@
 """The hash chain of a log: any change of any message, or of their order, changes its head.
 
-A message's leaf is the SHA-256 of its key, times, number and bytes; the head after it is the
-SHA-256 of the head before and the leaf. The first head is that of what stands before the messages:
-what the log says of itself, and its attachments. Every second or so a checkpoint goes into the
-file: the head, a signature if there is a key, and the first bytes of the leaves since the last one,
-which name the very message that was changed.
+A message's leaf is the SHA-256 of its times, number, channel (key, encodings and schema) and
+bytes; the head after it is the SHA-256 of the head before and the leaf. The first head is that of
+what stands before the messages: what the log says of itself, and its attachments. Every second or
+so a checkpoint goes into the file: the head, a signature if there is a key, and the first bytes of
+the leaves since the last one, which name the very message that was changed.
 """
 
 import base64
@@ -16,17 +16,17 @@ from dataclasses import dataclass, field
 
 LEAF_BYTES = 8
 _DOMAIN = b"fras.chain.1\0"
-_MESSAGE = struct.Struct("<IQQI")
+_MESSAGE = struct.Struct("<QQI")
 _SIGNED = struct.Struct("<Q")
 
 
-def leaf(topic: str, log_time: int, publish_time: int, sequence: int, payload: bytes) -> bytes:
+def leaf(channel: bytes, log_time: int, publish_time: int, sequence: int, payload: bytes) -> bytes:
     """Return the digest of one message.
 
     Parameters
     ----------
-    topic : str
-        Its key.
+    channel : bytes
+        Digest of its channel.
     log_time, publish_time : int
         Arrival and the producer's stamp [ns].
     sequence : int
@@ -34,9 +34,7 @@ def leaf(topic: str, log_time: int, publish_time: int, sequence: int, payload: b
     payload : bytes
         As it travelled.
     """
-    name = topic.encode()
-    digest = hashlib.sha256(_MESSAGE.pack(len(name), log_time, publish_time, sequence))
-    digest.update(name)
+    digest = hashlib.sha256(_MESSAGE.pack(log_time, publish_time, sequence) + channel)
     digest.update(payload)
     return digest.digest()
 
@@ -66,10 +64,19 @@ def to_sign(messages: int, head: bytes) -> bytes:
     return _DOMAIN + _SIGNED.pack(messages) + head
 
 
+def record_digest(content: Mapping[str, str]) -> str:
+    """Return the digest of a metadata record, hexadecimal."""
+    return hashlib.sha256(_said(content)).hexdigest()
+
+
 def closing_to_sign(content: Mapping[str, str]) -> bytes:
     """Return what the signature of the closing record is on: all of it but the signature."""
     unsigned = {name: value for name, value in content.items() if name != "signature"}
-    return _DOMAIN + json.dumps(unsigned, sort_keys=True, ensure_ascii=True).encode()
+    return _DOMAIN + _said(unsigned)
+
+
+def _said(content: Mapping[str, str]) -> bytes:
+    return json.dumps(dict(content), sort_keys=True, ensure_ascii=True).encode()
 
 
 @dataclass(frozen=True)
@@ -119,7 +126,10 @@ class Checkpoint:
             raise ValueError(f"no checkpoint: {type(error).__name__}: {error}") from error
         pieces = range(0, len(packed), LEAF_BYTES)
         leaves = tuple(packed[start : start + LEAF_BYTES] for start in pieces)
-        return cls(messages, head, leaves, signature)
+        checkpoint = cls(messages, head, leaves, signature)
+        if checkpoint.as_metadata() != dict(content):
+            raise ValueError("no checkpoint: it is not written as one")
+        return checkpoint
 
 
 @dataclass

@@ -2,18 +2,22 @@
 
 import hashlib
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
-from fras_common.bus import RawSample
 from fras_common.codec import read_header
+from fras_log.errors import ForeignLog
+from fras_log.events import Attached, Began, Broken, Cut, Recorded, Told
 from fras_log.keys import Signer
-from fras_log.names import CLOSED, METADATA, RECOVERED
-from fras_log.scan import Attached, Broken, Recorded, Told, scan
+from fras_log.names import BESIDE, CHECKPOINT, CLOSED, METADATA, PROFILE, RECOVERED
+from fras_log.scan import Progress, scan
 from fras_log.verify import verify_file
 from fras_log.writer import LogFile
 
 __all__ = ["Recovery", "recover_file"]
+
+# What the new log's own closing record says itself.
+_OWN = ("head", "messages", "signature")
 
 
 @dataclass(frozen=True)
@@ -31,7 +35,7 @@ class Recovery:
     last_tick : int
         The last of any message, -1 if none has one.
     damage : tuple of str
-        What was wrong with the old log, in its order.
+        What was wrong with the old log's bytes, in its order.
     """
 
     path: Path
@@ -41,7 +45,21 @@ class Recovery:
     damage: tuple[str, ...]
 
 
-def recover_file(path: Path, out: Path, now_ns: int, signer: Signer | None = None) -> Recovery:
+@dataclass
+class _Beginning:
+    """What a log says before its messages."""
+
+    opening: dict[str, str] = field(default_factory=dict[str, str])
+    attachments: dict[str, bytes] = field(default_factory=dict[str, bytes])
+
+
+def recover_file(
+    path: Path,
+    out: Path,
+    now_ns: int,
+    signer: Signer | None = None,
+    progress: Progress | None = None,
+) -> Recovery:
     """Write all that a log still holds into a new one.
 
     Parameters
@@ -54,41 +72,32 @@ def recover_file(path: Path, out: Path, now_ns: int, signer: Signer | None = Non
         Wall clock, for the attachments.
     signer : Signer, optional
         Signs the new log: who recovered it, not who recorded it.
+    progress : callable, optional
+        Told how many bytes are read, of how many; the file is read twice.
 
     Raises
     ------
     NoSuchLog, NotAnMcap, ForeignLog, LogExists
     """
-    opening: dict[str, str] = {}
-    attachments: dict[str, bytes] = {}
-    for event in scan(path):
-        match event:
-            case Told(name=name, content=content) if name == METADATA:
-                opening = content
-            case Attached(name=name, content=content):
-                attachments[name] = content
-            case Recorded():
-                break  # what describes the log stands before its messages
-            case _:
-                pass
-    chained = verify_file(path).chained
-    original = json.dumps(opening, sort_keys=True)
-    described = {name: value for name, value in opening.items() if name != "public_key"}
-    log = LogFile(out, described, attachments, now_ns, signer)
+    beginning = _read_beginning(path)
+    chained = verify_file(path, progress=progress).chained
+    described = {name: value for name, value in beginning.opening.items() if name != "public_key"}
+    log = LogFile(out, described, beginning.attachments, now_ns, signer)
     damage: list[str] = []
     last_tick = -1
     closing: dict[str, str] = {"reason": "recovered"}
-    for event in scan(path):
+    for event in scan(path, progress):
         match event:
             case Recorded():
-                sample = RawSample(event.topic, event.payload, event.encoding)
-                log.write(sample, event.log_time)
+                log.append(*event[1:])
                 header = read_header(event.payload)
                 last_tick = max(last_tick, header.tick if header is not None else -1)
-            case Broken(offset=offset, text=text):
+            case Broken(offset=offset, text=text) | Cut(offset=offset, text=text):
                 damage.append(f"offset {offset}: {text}")
             case Told(name=name, content=content) if name == CLOSED:
                 closing = {**content, "reason": f"recovered; {content.get('reason', '')}"}
+            case Told(name=name, content=content) if name not in (METADATA, CHECKPOINT):
+                log.add_metadata(f"{name} of {path.name}", content)
             case _:
                 pass
     log.add_metadata(
@@ -97,12 +106,38 @@ def recover_file(path: Path, out: Path, now_ns: int, signer: Signer | None = Non
             "source": path.name,
             "source_sha256": _sha256(path),
             "chained": str(chained),
-            "opening": original,
+            "opening": json.dumps(beginning.opening, sort_keys=True),
             "damage": "\n".join(damage),
         },
     )
-    log.close({name: closing[name] for name in closing if name not in ("head", "signature")})
+    log.close(
+        {
+            name: value
+            for name, value in closing.items()
+            if name not in _OWN and not name.startswith(BESIDE)
+        }
+    )
     return Recovery(out, log.messages, chained, last_tick, tuple(damage))
+
+
+def _read_beginning(path: Path) -> _Beginning:
+    found = _Beginning()
+    profile = PROFILE
+    for event in scan(path):
+        match event:
+            case Began(profile=profile):
+                pass
+            case Told(name=name, content=content) if name == METADATA:
+                found.opening = found.opening or content
+            case Attached(name=name, content=content):
+                found.attachments.setdefault(name, content)
+            case Recorded():
+                break
+            case _:
+                pass
+    if profile != PROFILE and not found.opening:
+        raise ForeignLog(path, f"its profile is {profile!r}, not {PROFILE!r}")
+    return found
 
 
 def _sha256(path: Path) -> str:

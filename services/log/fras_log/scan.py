@@ -5,371 +5,387 @@ stands, and every checksum that covers them is computed. After damage the scan g
 next whole piece begins.
 """
 
-import mmap
+import re
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import (
     Attachment,
+    AttachmentIndex,
     Channel,
-    Chunk,
     ChunkIndex,
     DataEnd,
     Footer,
     Header,
     Metadata,
+    MetadataIndex,
     Schema,
     Statistics,
+    SummaryOffset,
 )
-from mcap.stream_reader import CRCValidationError, get_chunk_data_stream
 
-from fras_log.errors import NoSuchLog, NotAnMcap
+from fras_log.channels import Definition
+from fras_log.chunks import FRAME, BadChunk, open_chunk
+from fras_log.errors import NotAnMcap
+from fras_log.events import Attached, Began, Broken, Cut, Ended, Event, Recorded, Told
+from fras_log.index import Index
+from fras_log.source import Source, open_source
+
+__all__ = [
+    "Attached",
+    "Began",
+    "Broken",
+    "Cut",
+    "Ended",
+    "Event",
+    "Progress",
+    "Recorded",
+    "Told",
+    "scan",
+]
+
+Progress = Callable[[int, int], None]
+"""Told how many bytes are read, of how many."""
 
 MAGIC = b"\x89MCAP0\r\n"
-_FRAME = struct.Struct("<BQ")
-_MESSAGE = struct.Struct("<HIQQ")
+_FOOTER_BYTES = 8 + 8 + 4
 _FOOTER_TAIL = struct.Struct("<BQQQ")
-# Before the compression's name in a chunk: three numbers of 8 bytes, one of 4.
-_BEFORE_COMPRESSION = 3 * 8 + 4
-_ZSTD = struct.pack("<I", 4) + b"zstd"
 _KNOWN = frozenset(int(opcode) for opcode in Opcode)
 # A record larger than this is a damaged length.
 _MOST_BYTES = 2**31
+# What stands where a piece begins from which to go on after damage: names with their lengths, in a
+# chunk after three numbers of 8 bytes and one of 4, in a record of our own at once.
+_PIECE = re.compile(rb"\x04\0\0\0zstd|\x0a\0\0\0fras\.chain|\x0b\0\0\0fras\.closed|\x04\0\0\0fras")
+_BEFORE_COMPRESSION = 3 * 8 + 4
+_OF_THE_INDEX: dict[int, Any] = {
+    Opcode.SCHEMA: Schema,
+    Opcode.CHANNEL: Channel,
+    Opcode.STATISTICS: Statistics,
+    Opcode.CHUNK_INDEX: ChunkIndex,
+    Opcode.ATTACHMENT_INDEX: AttachmentIndex,
+    Opcode.METADATA_INDEX: MetadataIndex,
+    Opcode.SUMMARY_OFFSET: SummaryOffset,
+}
 # What the library raises where bytes are damaged, depending on where that is.
-_DAMAGE = (
-    McapError,
-    CRCValidationError,
-    UnicodeDecodeError,
-    struct.error,
-    zstandard.ZstdError,
-    ValueError,
-    IndexError,
-    KeyError,
-    OverflowError,
-    MemoryError,
-)
+_DAMAGE = (McapError, struct.error, ValueError, IndexError, KeyError, OverflowError, MemoryError)
 
 
-@dataclass(frozen=True, slots=True)
-class Recorded:
-    """A message.
-
-    Parameters
-    ----------
-    offset : int
-        Of its chunk in the file.
-    topic, schema : str
-        Key and name of the schema, empty where it has none.
-    encoding : str
-        What the channel says of how it travelled.
-    log_time, publish_time, sequence
-        As the file has them.
-    payload : bytes
-        As it travelled.
-    """
-
-    offset: int
-    topic: str
-    schema: str
-    encoding: str
-    log_time: int
-    publish_time: int
-    sequence: int
-    payload: bytes
-
-
-@dataclass(frozen=True, slots=True)
-class Told:
-    """A metadata record."""
-
-    offset: int
-    name: str
-    content: dict[str, str]
-
-
-@dataclass(frozen=True, slots=True)
-class Attached:
-    """An attachment."""
-
-    offset: int
-    name: str
-    content: bytes
-
-
-@dataclass(frozen=True, slots=True)
-class Broken:
-    """Damage.
-
-    Parameters
-    ----------
-    offset : int
-        Where it was noticed.
-    text : str
-        What is wrong.
-    """
-
-    offset: int
-    text: str
-
-
-@dataclass(frozen=True, slots=True)
-class Ended:
-    """The file's end as it should be: footer, checksums, index and all."""
-
-    offset: int
-
-
-Event = Recorded | Told | Attached | Broken | Ended
-
-
-def scan(path: Path) -> Iterator[Event]:
+def scan(path: Path, progress: Progress | None = None) -> Iterator[Event]:
     """Yield what a file holds, in its order.
 
     Parameters
     ----------
     path : Path
         Opened for reading alone.
+    progress : callable, optional
+        Called at each record of the file.
 
     Raises
     ------
     NoSuchLog
         It can't be opened.
     NotAnMcap
-        It does not begin as an MCAP file does.
+        It does not begin as an MCAP file does, and no piece of a log is in it.
     """
-    try:
-        file = path.open("rb")
-    except OSError as error:
-        raise NoSuchLog(path, error.strerror or str(error)) from error
-    with file:
-        try:
-            data = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
-        except ValueError as error:
-            raise NotAnMcap(path, "it is empty") from error
-        except OSError as error:
-            raise NoSuchLog(path, error.strerror or str(error)) from error
-        with data:
-            if data[: len(MAGIC)] != MAGIC:
-                raise NotAnMcap(path, "it does not begin with MCAP's magic bytes")
-            yield from _Scan(data).events()
+    with open_source(path) as source:
+        one = _Scan(source, progress)
+        position = len(MAGIC)
+        if source.read(0, len(MAGIC)) != MAGIC:
+            problem = "it does not begin with MCAP's magic bytes"
+            position = one.next_piece(1)
+            if position < 0:
+                raise NotAnMcap(path, problem)
+            yield Broken(0, problem)
+        yield from one.events(position)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class _Frame:
     offset: int
     opcode: int
     start: int
     end: int
 
+    @property
+    def length(self) -> int:
+        return self.end - self.offset
+
+
+class _Damaged(ValueError):
+    """A record that is not what it should be."""
+
 
 class _Scan:
-    def __init__(self, data: mmap.mmap) -> None:
-        self._data = data
-        self._size = len(data)
-        self._schemas: dict[int, str] = {}
-        self._channels: dict[int, Channel] = {}
-        self._chunks: set[int] = set()
-        self._indexed: set[int] = set()
-        self._messages = 0
-        self._counted = -1
-        self._data_end = -1
-        self._unknown_channels = 0
+    def __init__(self, source: Source, progress: Progress | None) -> None:
+        self._source = source
+        self._size = source.size
+        self._progress = progress
+        self._index = Index()
+        self._definitions: dict[int, Definition] = {}
+        # Channels that only the index names: where the piece that defined them is lost.
+        self._spare: dict[int, Definition] = {}
+        self._spare_schemas: dict[int, Schema] = {}
+        self._broken = False
+        self._data_end: _Frame | None = None
 
-    def events(self) -> Iterator[Event]:
-        position = len(MAGIC)
+    def events(self, position: int) -> Iterator[Event]:
         self._learn_from_summary()
         while position < self._size:
+            if self._progress is not None:
+                self._progress(position, self._size)
             frame = self._frame(position)
-            if isinstance(frame, Broken):
-                yield frame
-                position = self._next_chunk(position + 1)
-                if position < 0:
+            if isinstance(frame, _Frame) and frame.opcode == Opcode.FOOTER:
+                ended, position = yield from self._finish(frame)
+                if ended:
                     return
-                continue
-            if frame.opcode == Opcode.FOOTER:
-                yield from self._finish(frame)
-                return
-            yield from self._read(frame)
-            position = frame.end
-        yield Broken(self._size, "the file ends without a footer: it was cut, or never closed")
+            elif isinstance(frame, _Frame):
+                position = yield from self._read(frame)
+            else:
+                next_position = self.next_piece(position + 1)
+                if isinstance(frame, Cut) and next_position >= 0:
+                    frame = Broken(frame.offset, "a record here is longer than the file")
+                yield self._note(frame)
+                if next_position < 0:
+                    return
+                position = next_position
+        yield Cut(self._size, "the file ends without a footer: it was cut, or never closed")
 
-    def _frame(self, position: int) -> _Frame | Broken:
-        if position + _FRAME.size > self._size:
-            return Broken(position, f"the file ends within a record, after {self._size} bytes")
-        opcode, length = _FRAME.unpack_from(self._data, position)
-        start = position + _FRAME.size
+    # --- framing --------------------------------------------------------------------------
+
+    def _frame(self, position: int) -> _Frame | Broken | Cut:
+        head = self._source.read(position, position + FRAME.size)
+        if len(head) < FRAME.size:
+            return Cut(position, f"the file ends within a record, after {self._size} bytes")
+        opcode, length = FRAME.unpack(head)
+        start = position + FRAME.size
         if opcode not in _KNOWN or length > _MOST_BYTES:
             return Broken(position, f"no record begins here (kind {opcode}, {length} bytes)")
         if start + length > self._size:
-            return Broken(
-                position,
-                f"the file ends within a record of {length} bytes, after {self._size} bytes",
-            )
+            text = f"the file ends within a record of {length} bytes, after {self._size} bytes"
+            return Cut(position, text)
         return _Frame(position, opcode, start, start + length)
 
-    def _next_chunk(self, position: int) -> int:
-        """Find where the next chunk begins that is whole; -1 if there is none."""
-        while (found := self._data.find(_ZSTD, position)) >= 0:
-            offset = found - _BEFORE_COMPRESSION - _FRAME.size
+    def next_piece(self, position: int) -> int:
+        """Where the next piece begins that is whole; -1 if there is none."""
+        while (found := self._source.find(_PIECE, position)) >= 0:
             position = found + 1
-            if offset < len(MAGIC) or self._data[offset] != Opcode.CHUNK:
-                continue
-            frame = self._frame(offset)
-            if isinstance(frame, _Frame):
-                return offset
+            for before in (_BEFORE_COMPRESSION, 0):
+                offset = found - before - FRAME.size
+                frame = self._frame(offset) if offset >= len(MAGIC) else None
+                if isinstance(frame, _Frame) and self._is_whole(frame):
+                    return offset
         return -1
 
-    def _read(self, frame: _Frame) -> Iterator[Event]:
+    def _is_whole(self, frame: _Frame) -> bool:
         try:
-            match frame.opcode:
-                case Opcode.CHUNK:
-                    self._chunks.add(frame.offset)
-                    yield from self._read_chunk(frame)
-                case Opcode.METADATA:
-                    record = Metadata.read(self._stream(frame))
-                    yield Told(frame.offset, record.name, dict(record.metadata))
-                case Opcode.ATTACHMENT:
-                    yield from self._read_attachment(frame)
-                case Opcode.DATA_END:
-                    yield from self._read_data_end(frame)
-                case Opcode.CHUNK_INDEX:
-                    self._indexed.add(ChunkIndex.read(self._stream(frame)).chunk_start_offset)
-                case Opcode.STATISTICS:
-                    self._counted = Statistics.read(self._stream(frame)).message_count
-                case Opcode.SCHEMA:
-                    self._take(Schema.read(self._stream(frame)))
-                case Opcode.CHANNEL:
-                    self._take(Channel.read(self._stream(frame)))
-                case Opcode.HEADER:
-                    Header.read(self._stream(frame))
-                case _:
-                    pass
+            if frame.opcode == Opcode.CHUNK:
+                open_chunk(self._content(frame))
+            elif frame.opcode == Opcode.METADATA:
+                self._parse(frame, Metadata)
+            else:
+                return False
+        except _DAMAGE:
+            return False
+        return True
+
+    def _content(self, frame: _Frame) -> bytes:
+        content = self._source.read(frame.start, frame.end)
+        if len(content) != frame.end - frame.start:
+            raise _Damaged("the file was cut while it was read")
+        return content
+
+    def _parse(self, frame: _Frame, kind: Any, after: int = 0) -> Any:
+        """Read a record that ends where its content does, but for `after` bytes."""
+        stream = ReadDataStream(BytesIO(self._content(frame)))
+        record = kind.read(stream)
+        if stream.count + after != frame.end - frame.start:
+            raise _Damaged("there is more in it than belongs there")
+        return record
+
+    def _note(self, event: Broken | Cut) -> Broken | Cut:
+        self._broken = True
+        self._index.lose()
+        return event
+
+    # --- records --------------------------------------------------------------------------
+
+    def _read(self, frame: _Frame) -> Generator[Event, None, int]:
+        """Yield what a record tells; return where the next one begins."""
+        try:
+            yield from self._understand(frame)
+        except BadChunk as error:
+            yield self._note(Broken(frame.offset, str(error)))
+            if error.framed:
+                return frame.end
         except _DAMAGE as error:
-            kind = type(error).__name__
-            yield Broken(frame.offset, f"a record that can't be read ({kind}: {error})")
+            known = isinstance(error, _Damaged)
+            why = str(error) if known else f"{type(error).__name__}: {error}"
+            yield self._note(Broken(frame.offset, f"a record that can't be read ({why})"))
+        else:
+            return frame.end
+        # Its length may be what is damaged: look for the next piece within it, too.
+        following = self.next_piece(frame.offset + 1)
+        return following if following >= 0 else frame.end
+
+    def _understand(self, frame: _Frame) -> Iterator[Event]:
+        if frame.opcode == Opcode.MESSAGE_INDEX:
+            content = self._content(frame)
+            if problem := self._index.message_index(frame.offset, frame.length, content):
+                raise _Damaged(problem)
+            return
+        if missing := self._index.leave_chunk():
+            yield self._note(Broken(frame.offset, missing))
+        if self._data_end is not None:
+            if frame.opcode not in _OF_THE_INDEX:
+                raise _Damaged("it stands after the end of the data")
+            self._index.told(self._parse(frame, _OF_THE_INDEX[frame.opcode]))
+            return
+        match frame.opcode:
+            case Opcode.CHUNK:
+                yield from self._read_chunk(frame)
+            case Opcode.METADATA:
+                record = self._parse(frame, Metadata)
+                self._index.point(Opcode.METADATA, frame.offset, frame.length, record.name)
+                yield Told(frame.offset, record.name, dict(record.metadata))
+            case Opcode.ATTACHMENT:
+                yield self._read_attachment(frame)
+            case Opcode.DATA_END:
+                yield from self._read_data_end(frame)
+            case Opcode.HEADER:
+                if frame.offset != len(MAGIC):
+                    raise _Damaged("a header that is not the file's first record")
+                yield Began(frame.offset, self._parse(frame, Header).profile)
+            case _:
+                raise _Damaged(f"a record of kind {frame.opcode} where no recorder writes one")
 
     def _read_chunk(self, frame: _Frame) -> Iterator[Event]:
-        chunk = Chunk.read(self._stream(frame))
         # All of it or nothing: a chunk whose checksum is wrong is no evidence.
-        stream, size = get_chunk_data_stream(chunk, validate_crc=True)
-        data = stream.read(size)
-        unknown = position = 0
-        while position < size:
-            opcode, length = _FRAME.unpack_from(data, position)
-            start = position + _FRAME.size
-            position = start + length
-            if opcode != Opcode.MESSAGE:
-                self._take_inside(opcode, data[start:position])
-                continue
-            self._messages += 1
-            number, sequence, log_time, publish_time = _MESSAGE.unpack_from(data, start)
-            channel = self._channels.get(number)
-            if channel is None:
-                unknown += 1
-                continue
-            yield Recorded(
-                frame.offset,
-                channel.topic,
-                self._schemas.get(channel.schema_id, ""),
-                channel.metadata.get("zenoh_encoding", ""),
-                log_time,
-                publish_time,
-                sequence,
-                data[start + _MESSAGE.size : position],
-            )
+        chunk = open_chunk(self._content(frame))
+        offset, unknown, definitions = frame.offset, 0, self._definitions
+        for opcode, number, sequence, log_time, publish_time, payload in chunk.records():
+            if opcode == Opcode.MESSAGE:
+                channel = definitions.get(number) or self._spare.get(number)
+                if channel is None:
+                    unknown += 1
+                else:
+                    yield Recorded(offset, channel, log_time, publish_time, sequence, payload)
+            elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+                kind = Schema if opcode == Opcode.SCHEMA else Channel
+                record = kind.read(ReadDataStream(BytesIO(payload)))
+                if problem := self._index.define(record):
+                    yield self._note(Broken(offset, problem))
+                elif isinstance(record, Channel):
+                    known = self._spare_schemas | self._index.schemas
+                    definitions[record.id] = _definition(record, known)
+            else:
+                yield self._note(Broken(offset, f"a record of kind {opcode} in this chunk"))
+        self._index.chunk(offset, frame.length, chunk)
         if unknown:
             text = f"{unknown} messages of this chunk are of keys that an earlier, lost piece named"
-            yield Broken(frame.offset, text)
+            yield self._note(Broken(offset, text))
 
-    def _read_attachment(self, frame: _Frame) -> Iterator[Event]:
-        record = Attachment.read(self._stream(frame))
-        covered = zlib.crc32(self._data[frame.start : frame.end - 4])
-        (told,) = struct.unpack_from("<I", self._data, frame.end - 4)
-        if told not in (0, covered):
-            yield Broken(frame.offset, f"the checksum of attachment {record.name!r} is wrong")
-        yield Attached(frame.offset, record.name, record.data)
+    def _read_attachment(self, frame: _Frame) -> Event:
+        record = self._parse(frame, Attachment)
+        content = self._content(frame)
+        if content[-4:] != struct.pack("<I", zlib.crc32(content[:-4])):
+            return self._note(
+                Broken(frame.offset, f"the checksum of attachment {record.name!r} is wrong")
+            )
+        self._index.point(Opcode.ATTACHMENT, frame.offset, frame.length, record.name)
+        return Attached(frame.offset, record.name, record.data)
 
     def _read_data_end(self, frame: _Frame) -> Iterator[Event]:
-        self._data_end = frame.offset
-        told = DataEnd.read(self._stream(frame)).data_section_crc
-        with memoryview(self._data) as view, view[: frame.offset] as data:
-            covered = zlib.crc32(data)
-        if told != covered:
-            yield Broken(frame.offset, "the checksum over all data is wrong: bytes were changed")
+        told = self._parse(frame, DataEnd).data_section_crc
+        self._data_end = frame
+        if told != self._source.checksum(0, frame.offset):
+            text = "the checksum over all data is wrong: bytes were changed"
+            yield self._note(Broken(frame.offset, text, loses=False))
 
-    def _finish(self, frame: _Frame) -> Iterator[Event]:
+    # --- the end --------------------------------------------------------------------------
+
+    def _finish(self, frame: _Frame) -> Generator[Event, None, tuple[bool, int]]:
+        """Yield what is wrong with the end; return whether it is one, else where to go on."""
+        after = self._size - frame.end - len(MAGIC)
+        problems = list(self._problems_of_the_end(frame))
+        if after and problems:
+            # Not an end, but a record that was made to look like one, or two files.
+            following = self.next_piece(frame.offset + 1)
+            if following >= 0:
+                yield self._note(Broken(frame.offset, "an end of the file that is none"))
+                return False, following
+        if after > 0:
+            problems.append(Broken(frame.end, f"{after} bytes follow the end of the log"))
+        elif self._source.read(frame.end, self._size) != MAGIC:
+            problems.append(Broken(frame.end, "the file does not end with MCAP's magic bytes"))
+        for problem in problems:
+            yield self._note(problem)
+        if not self._broken:
+            yield Ended(frame.offset)
+        return True, self._size
+
+    def _problems_of_the_end(self, frame: _Frame) -> Iterator[Broken]:
         try:
-            footer = Footer.read(self._stream(frame))
+            footer: Footer = self._parse(frame, Footer)
         except _DAMAGE as error:
             yield Broken(frame.offset, f"the footer can't be read ({type(error).__name__})")
             return
-        problems = list(self._problems_of_the_end(frame, footer))
-        yield from problems
-        if not problems:
-            yield Ended(frame.offset)
-
-    def _problems_of_the_end(self, frame: _Frame, footer: Footer) -> Iterator[Broken]:
-        if self._data_end < 0:
-            yield Broken(frame.offset, "the data's end is not marked")
-        if frame.end - frame.start != _FOOTER_TAIL.size - _FRAME.size + 4 or not (
-            self._data_end < footer.summary_start <= frame.offset
-        ):
-            yield Broken(frame.offset, "the footer points to no summary")
+        if self._data_end is None:
+            yield Broken(frame.offset, "the data's end is not marked", loses=False)
             return
-        with memoryview(self._data) as view, view[footer.summary_start : frame.offset] as summary:
-            covered = zlib.crc32(summary)
-        head = self._data[frame.offset : frame.offset + _FOOTER_TAIL.size]
-        if footer.summary_crc != zlib.crc32(head, covered):
-            yield Broken(frame.offset, "the checksum over the index is wrong: bytes were changed")
-        if self._data[frame.end :] != MAGIC:
-            yield Broken(frame.end, "the file does not end with MCAP's magic bytes alone")
-        if self._indexed != self._chunks:
-            lost = len(self._indexed ^ self._chunks)
-            yield Broken(footer.summary_start, f"the index and the data differ by {lost} chunks")
-        if self._counted != self._messages:
-            text = f"the index counts {self._counted} messages, there are {self._messages}"
-            yield Broken(footer.summary_start, text)
+        if not self._data_end.end == footer.summary_start <= frame.offset:
+            yield Broken(frame.offset, "the footer points to no index", loses=False)
+            return
+        covered = self._source.read(footer.summary_start, frame.offset)
+        covered += self._source.read(frame.offset, frame.offset + _FOOTER_TAIL.size)
+        if footer.summary_crc != zlib.crc32(covered):
+            text = "the checksum over the index is wrong: bytes were changed"
+            yield Broken(frame.offset, text, loses=False)
+        elif not self._broken:
+            yield from self._index.problems(footer.summary_start)
 
     def _learn_from_summary(self) -> None:
         """Take keys from the index at the end, so that a lost first chunk costs only itself."""
-        tail = self._size - len(MAGIC) - _FRAME.size - 20
+        tail = self._size - len(MAGIC) - FRAME.size - _FOOTER_BYTES
         frame = self._frame(tail) if tail > len(MAGIC) else None
         if not isinstance(frame, _Frame) or frame.opcode != Opcode.FOOTER:
             return
-        position = struct.unpack_from("<Q", self._data, frame.start)[0]
-        while len(MAGIC) < position < tail:
-            one = self._frame(position)
-            if isinstance(one, Broken):
-                return
-            try:
+        schemas = self._spare_schemas
+        try:
+            position = self._parse(frame, Footer).summary_start
+            while len(MAGIC) < position < tail:
+                one = self._frame(position)
+                if not isinstance(one, _Frame):
+                    return
                 if one.opcode == Opcode.SCHEMA:
-                    self._take(Schema.read(self._stream(one)))
+                    schema = self._parse(one, Schema)
+                    schemas[schema.id] = schema
                 elif one.opcode == Opcode.CHANNEL:
-                    self._take(Channel.read(self._stream(one)))
-            except _DAMAGE:
-                # The scan itself will come here and say so.
-                return
-            position = one.end
+                    channel = self._parse(one, Channel)
+                    self._spare[channel.id] = _definition(channel, schemas)
+                position = one.end
+        except _DAMAGE:
+            # The scan itself will come here and say so.
+            return
 
-    def _take_inside(self, opcode: int, content: bytes) -> None:
-        kind = {Opcode.SCHEMA: Schema, Opcode.CHANNEL: Channel}.get(Opcode(opcode))
-        if kind is not None:
-            self._take(kind.read(ReadDataStream(BytesIO(content))))
 
-    def _take(self, record: Any) -> None:
-        if isinstance(record, Schema):
-            self._schemas[record.id] = record.name
-        elif isinstance(record, Channel):
-            self._channels[record.id] = record
-
-    def _stream(self, frame: _Frame) -> ReadDataStream:
-        return ReadDataStream(BytesIO(self._data[frame.start : frame.end]))
+def _definition(channel: Channel, schemas: dict[int, Schema]) -> Definition:
+    metadata = tuple(channel.metadata.items())
+    schema = schemas.get(channel.schema_id)
+    if schema is None:
+        return Definition(channel.topic, channel.message_encoding, metadata)
+    return Definition(
+        channel.topic,
+        channel.message_encoding,
+        metadata,
+        schema.name,
+        schema.encoding,
+        schema.data,
+    )

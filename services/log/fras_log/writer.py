@@ -23,11 +23,13 @@ from fras_log.chain import (
     closing_to_sign,
     first_head,
     leaf,
+    record_digest,
     to_sign,
 )
+from fras_log.channels import Definition
 from fras_log.errors import LogExists
 from fras_log.keys import Signer
-from fras_log.names import CHECKPOINT, CLOSED, METADATA, PROFILE
+from fras_log.names import BESIDE, CHECKPOINT, CLOSED, METADATA, PROFILE
 
 CHUNK_BYTES = 1024 * 1024
 _MOST_NS = 2**64 - 1
@@ -113,8 +115,10 @@ class LogFile:
         if signer is not None:
             opening["public_key"] = signer.public.raw.hex()
         self._chain = Chain(first_head(opening, attachments))
-        self._channels: dict[str, int] = {}
-        self._schemas: dict[str, int] = {}
+        self._definitions: dict[tuple[str, str], Definition] = {}
+        self._channels: dict[Definition, int] = {}
+        self._schemas: dict[tuple[str, str, bytes], int] = {}
+        self._beside: dict[str, str] = {}
         self._writer = Writer(
             self._stream,
             # Chunks are closed by `flush` alone, each with its checkpoint.
@@ -149,19 +153,25 @@ class LogFile:
         # The file has room for 64 and 32 bits without a sign; the message itself is verbatim.
         stamp_ns = min(max(header.stamp_ns if header is not None else arrival_ns, 0), _MOST_NS)
         sequence = (header.seq if header is not None else 0) & _MOST_SEQUENCE
+        self.append(self._define(sample), arrival_ns, stamp_ns, sequence, sample.payload)
+        return header
+
+    def append(
+        self, channel: Definition, log_time: int, publish_time: int, sequence: int, payload: bytes
+    ) -> None:
+        """Append a message as it is, whatever its payload says of itself."""
         self._writer.add_message(
-            channel_id=self._channel(sample),
-            log_time=arrival_ns,
-            data=sample.payload,
-            publish_time=stamp_ns,
+            channel_id=self._channel(channel),
+            log_time=log_time,
+            data=payload,
+            publish_time=publish_time,
             sequence=sequence,
         )
-        self._chain.add(leaf(sample.key, arrival_ns, stamp_ns, sequence, sample.payload))
+        self._chain.add(leaf(channel.digest, log_time, publish_time, sequence, payload))
         self.messages += 1
-        self._chunk_bytes += len(sample.payload)
+        self._chunk_bytes += len(payload)
         if self._chunk_bytes >= CHUNK_BYTES:
             self.flush()
-        return header
 
     def flush(self) -> None:
         """Close the chunk under way with its checkpoint, and hand both to the operating system."""
@@ -180,13 +190,15 @@ class LogFile:
         return self._chain.head.hex()
 
     def add_metadata(self, name: str, content: Mapping[str, str]) -> None:
-        """Say something about the log, beside its messages."""
+        """Say something about the log, once by each name; the closing record vouches for it."""
         self._writer.add_metadata(name, dict(content))
+        self._beside[BESIDE + name] = record_digest(content)
 
     def close(self, summary: Mapping[str, str]) -> None:
         """Write the closing metadata and the index, and close the file."""
         self.flush()
-        closing = {**summary, "head": self.head, "messages": str(self.messages), "signature": ""}
+        vouched = {"head": self.head, "messages": str(self.messages), "signature": ""}
+        closing = {**summary, **self._beside, **vouched}
         if self._signer is not None:
             closing["signature"] = self._signer.sign(closing_to_sign(closing)).hex()
         self._writer.add_metadata(CLOSED, closing)
@@ -221,25 +233,41 @@ class LogFile:
         self.lost += stream.gap
         return False
 
-    def _channel(self, sample: RawSample) -> int:
-        if sample.key not in self._channels:
-            self._channels[sample.key] = self._writer.register_channel(
-                topic=sample.key,
-                message_encoding="msgpack",
-                schema_id=self._schema(sample.key),
-                metadata={"zenoh_encoding": sample.encoding},
-            )
-        return self._channels[sample.key]
+    def _define(self, sample: RawSample) -> Definition:
+        name = (sample.key, sample.encoding)
+        if name not in self._definitions:
+            self._definitions[name] = _definition(sample)
+        return self._definitions[name]
 
-    def _schema(self, key: str) -> int:
-        topic = topic_of(key)
-        if topic is None:
-            return 0
-        name = topic.type.__name__
-        if name not in self._schemas:
-            self._schemas[name] = self._writer.register_schema(
-                name=f"fras.{name}",
-                encoding="jsonschema",
-                data=json.dumps(json_schema(topic.type)).encode(),
+    def _channel(self, channel: Definition) -> int:
+        if channel not in self._channels:
+            self._channels[channel] = self._writer.register_channel(
+                topic=channel.topic,
+                message_encoding=channel.message_encoding,
+                schema_id=self._schema(channel),
+                metadata=dict(channel.metadata),
             )
-        return self._schemas[name]
+        return self._channels[channel]
+
+    def _schema(self, channel: Definition) -> int:
+        if not channel.schema:
+            return 0
+        schema = (channel.schema, channel.schema_encoding, channel.schema_data)
+        if schema not in self._schemas:
+            self._schemas[schema] = self._writer.register_schema(*schema)
+        return self._schemas[schema]
+
+
+def _definition(sample: RawSample) -> Definition:
+    topic = topic_of(sample.key)
+    metadata = (("zenoh_encoding", sample.encoding),)
+    if topic is None:
+        return Definition(sample.key, "msgpack", metadata)
+    return Definition(
+        sample.key,
+        "msgpack",
+        metadata,
+        schema=f"fras.{topic.type.__name__}",
+        schema_encoding="jsonschema",
+        schema_data=json.dumps(json_schema(topic.type)).encode(),
+    )
