@@ -354,7 +354,7 @@ def log_show(
     """Show the messages of one key."""
     from fras_cli.log_show import show_log
 
-    show_log(_log_file(log), key, Console(), as_json=json, first_tick=first, last_tick=last)
+    show_log(_log_file(log), key, _console(json), as_json=json, first_tick=first, last_tick=last)
 
 
 @log_app.command("export")

@@ -6,6 +6,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.markup import escape
 
+from fras_cli.progress import read_progress
 from fras_cli.run import EXIT_NOT_SUCCESS
 from fras_log import recover_file
 
@@ -20,10 +21,11 @@ def recover_log(path: Path, out: Path | None, console: Console) -> int:
 
     Raises
     ------
-    NoSuchLog, NotAnMcap, LogExists
+    NoSuchLog, NotAnMcap, ForeignLog, LogExists
     """
     target = out or path.with_suffix(".recovered.mcap")
-    recovery = recover_file(path, target, time.time_ns())
+    with read_progress(console, "recovering") as progress:
+        recovery = recover_file(path, target, time.time_ns(), progress=progress)
     for damage in recovery.damage:
         console.print(f"was damaged: {escape(damage)}", style="yellow")
     if not recovery.damage:

@@ -2,6 +2,7 @@
 
 import base64
 import json
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, cast
@@ -12,7 +13,7 @@ from rich.markup import escape
 
 from fras_common.codec import read_header
 from fras_common.errors import FrasError
-from fras_log.scan import Broken, Recorded, scan
+from fras_log.scan import Broken, Cut, Recorded, scan
 
 MOST_ITEMS = 8
 MOST_BYTES = 16
@@ -53,7 +54,7 @@ def show_log(
     """
     keys: set[str] = set()
     for event in scan(path):
-        if isinstance(event, Broken):
+        if isinstance(event, Broken | Cut):
             console.print(f"damaged at offset {event.offset}: {escape(event.text)}", style="red")
         if not isinstance(event, Recorded):
             continue
@@ -78,8 +79,14 @@ def show_log(
 
 
 def _decode(payload: bytes) -> Any:
-    """Decode MessagePack with no knowledge of its type; the library has no types either."""
-    return cast(Any, msgpack).unpackb(payload, strict_map_key=False)
+    """Decode MessagePack with no knowledge of its type, which the library has none of either.
+
+    What is no MessagePack stays the bytes that it is.
+    """
+    try:
+        return cast(Any, msgpack).unpackb(payload, strict_map_key=False)
+    except (ValueError, OverflowError, RecursionError, msgpack.UnpackException):
+        return payload
 
 
 def _plain(value: Any) -> Any:
@@ -90,6 +97,10 @@ def _plain(value: Any) -> Any:
         return {str(name): _plain(one) for name, one in cast(dict[Any, Any], value).items()}
     if isinstance(value, list):
         return [_plain(one) for one in cast(list[Any], value)]
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)  # JSON has no such number
+    if not isinstance(value, str | int | float | None):
+        return str(value)  # MessagePack's extensions
     return value
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.markup import escape
 
+from fras_cli.progress import read_progress
 from fras_cli.report import Trial, read_trial
 from fras_cli.run import EXIT_NOT_SUCCESS
 from fras_common.errors import FrasError
@@ -55,7 +56,9 @@ def verify_log(
     LogIncomplete
         If the context or the plan behind an action is not in an intact log.
     """
-    found = verify_file(path, trusted_keys(keys), head.strip().lower())
+    trusted = trusted_keys(keys)
+    with read_progress(console, "verifying") as progress:
+        found = verify_file(path, trusted, head.strip().lower(), progress)
     _print_file(found, console)
     try:
         kept = _verify_trial(path, asp_dir, console)
@@ -82,8 +85,15 @@ def _print_file(found: Verification, console: Console) -> None:
         )
     elif found.intact:
         console.print("The log is intact. It is not signed, so nobody vouches for who wrote it.")
-    elif not found.findings:
-        console.print("The log was never closed; what is there is as it was recorded.")
+    elif found.only("end"):
+        console.print(
+            f"The log was never closed, or was cut: its chain vouches for the {found.chained} "
+            "messages up to there. `fras log recover` makes a whole log of them."
+        )
+    elif found.only("version"):
+        console.print("What could be checked is as it was recorded; a newer FRAS checks the rest.")
+    elif found.only("sequence", "schema", "interlock"):
+        console.print("The log is what was recorded; what was recorded is not as it should be.")
     else:
         console.print(
             f"The log is NOT what was recorded. Its chain vouches for the first {found.chained} "

@@ -3,14 +3,16 @@
 `python -m fras_log.keys` makes this machine's key and prints its fingerprint.
 """
 
+import contextlib
 import hashlib
 import os
-import sys
+import stat
+import tempfile
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from cryptography.exceptions import InvalidSignature
+from cryptography.exceptions import InvalidSignature, UnsupportedAlgorithm
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey, Ed25519PublicKey
 from cryptography.hazmat.primitives.serialization import (
     Encoding,
@@ -74,9 +76,19 @@ class Signer:
 
 
 def default_key_path() -> Path:
-    """Where this machine's key is: `$XDG_DATA_HOME/fras/log.key`, or below `~/.local/share`."""
+    """Where this machine's key is: `$XDG_DATA_HOME/fras/log.key`, or below `~/.local/share`.
+
+    Raises
+    ------
+    BadKey
+        Neither is known, as for a user whom no system knows.
+    """
     base = os.environ.get("XDG_DATA_HOME")
-    return (Path(base) if base else Path.home() / ".local" / "share") / "fras" / "log.key"
+    try:
+        data = Path(base) if base else Path.home() / ".local" / "share"
+    except RuntimeError as error:
+        raise BadKey("there is no home directory for the key: set XDG_DATA_HOME") from error
+    return data / "fras" / "log.key"
 
 
 def load_or_make(path: Path) -> Signer:
@@ -85,28 +97,29 @@ def load_or_make(path: Path) -> Signer:
     Raises
     ------
     BadKey
-        The file is no key, or can't be read or made.
+        The file is no key, is not its owner's alone, or can't be read or made.
     """
     try:
         if not path.exists():
             _make(path)
+        # Whoever can read it can sign in its name.
+        if path.stat().st_mode & (stat.S_IRWXG | stat.S_IRWXO):
+            raise BadKey(f"{path}: others may use this key; chmod 600 it", path=path)
         key = load_pem_private_key(path.read_bytes(), password=None)
-    except (OSError, ValueError, TypeError) as error:
+    except (OSError, ValueError, TypeError, UnsupportedAlgorithm) as error:
         raise BadKey(f"{path}: no key to sign logs with: {error}", path=path) from error
     if not isinstance(key, Ed25519PrivateKey):
         raise BadKey(f"{path}: is no Ed25519 key", path=path)
+    _publish(key, path.with_suffix(PUBLIC_SUFFIX))
     return Signer(key)
 
 
 def _make(path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
     key = Ed25519PrivateKey.generate()
-    private = key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption())
-    # Complete or not there, and readable by its owner alone from the first byte on.
-    temporary = path.with_suffix(f".{os.getpid()}")
-    descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-    with os.fdopen(descriptor, "wb") as file:
-        file.write(private)
+    temporary = _write_beside(
+        path, key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption())
+    )
     try:
         # Unlike a rename this fails if another process was quicker; then its key is the one.
         path.hardlink_to(temporary)
@@ -114,8 +127,26 @@ def _make(path: Path) -> None:
         return
     finally:
         temporary.unlink()
+
+
+def _publish(key: Ed25519PrivateKey, path: Path) -> None:
+    """Write the public half, if whoever made the key did not get to it yet."""
+    if path.exists():
+        return
     public = key.public_key().public_bytes(Encoding.PEM, PublicFormat.SubjectPublicKeyInfo)
-    path.with_suffix(PUBLIC_SUFFIX).write_bytes(public)
+    # A key where nothing can be written signs all the same; the next start tries again.
+    with contextlib.suppress(OSError):
+        temporary = _write_beside(path, public)
+        temporary.chmod(0o644)
+        temporary.replace(path)
+
+
+def _write_beside(path: Path, content: bytes) -> Path:
+    """Write a file of its owner's alone, for a move that shows it complete or not at all."""
+    descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=path.stem)
+    with os.fdopen(descriptor, "wb") as file:
+        file.write(content)
+    return Path(name)
 
 
 def read_public(path: Path) -> PublicKey:
@@ -128,7 +159,7 @@ def read_public(path: Path) -> PublicKey:
     """
     try:
         key = load_pem_public_key(path.read_bytes())
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, UnsupportedAlgorithm) as error:
         raise BadKey(f"{path}: no public key: {error}", path=path) from error
     if not isinstance(key, Ed25519PublicKey):
         raise BadKey(f"{path}: is no Ed25519 key", path=path)
@@ -147,9 +178,3 @@ def trusted_keys(paths: Iterable[Path]) -> list[PublicKey]:
         return [read_public(path) for path in given]
     own = default_key_path().with_suffix(PUBLIC_SUFFIX)
     return [read_public(own)] if own.exists() else []
-
-
-if __name__ == "__main__":
-    made = load_or_make(default_key_path())
-    print(f"logs are signed with key {made.public.fingerprint}, {default_key_path()}")
-    sys.exit(0)
