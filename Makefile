@@ -59,6 +59,7 @@ bench: $(VENV)/.installed-dev ## measure; figures belong into docs/benchmarks.md
 	$(BIN)/fras bench criteria
 	$(BIN)/fras bench awareness
 	$(BIN)/fras bench motion
+	$(BIN)/fras bench recorder
 
 clean: ## remove what was built; runs/ stays
 	rm -rf $(VENV) build dist .pytest_cache .ruff_cache .import_linter_cache .hypothesis

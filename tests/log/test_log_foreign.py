@@ -26,6 +26,12 @@ from support.forger import metadata, put_together, take_apart
 NEWER = "9.0.1"
 
 
+def pack(value: object) -> bytes:
+    packed = msgpack.packb(value)
+    assert packed is not None
+    return packed
+
+
 def foreign(profile: str = "ros2", messages: int = 3) -> bytes:
     stream = io.BytesIO()
     writer = Writer(stream)
@@ -162,9 +168,9 @@ def newer_log(path: Path, signer: Signer) -> LogFile:
         recording.tick(tick)
     header = {"stamp_ns": 5, "seq": 0, "source": "sim/1", "trial": "t-1", "tick": 2}
     for number in range(30):
-        new = msgpack.packb(header | {"seq": number, "torque_nm": 1.0})
+        new = pack(header | {"seq": number, "torque_nm": 1.0})
         file.write(RawSample("robot/torque", new, "application/msgpack"), 10 + number)
-    changed = msgpack.packb(header | {"seq": 3, "level": {"now": "a map"}})
+    changed = pack(header | {"seq": 3, "level": {"now": "a map"}})
     file.write(RawSample("sa/verdict", changed, "application/msgpack"), 50)
     file.close({})
     return file

@@ -22,6 +22,10 @@ BENCHMARKS: dict[str, tuple[str, str]] = {
         "What a verdict and a context cost, how well a crossing is foretold.",
     ),
     "motion": ("benchmarks.motion", "The arms against their limits, their stops and their reach."),
+    "recorder": (
+        "benchmarks.recorder",
+        "Writing and verifying a log against the bare library; loss at 50 times a trial's rate.",
+    ),
     "loop": ("benchmarks.loop", "A tick of all services against three raw Zenoh hops."),
 }
 

@@ -43,7 +43,3 @@ class Definition:
     def encoding(self) -> str:
         """How its payloads travelled."""
         return dict(self.metadata).get("zenoh_encoding", "")
-
-    def __hash__(self) -> int:
-        """Hash the digest, which is computed once."""
-        return hash(self.digest)

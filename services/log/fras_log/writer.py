@@ -32,8 +32,6 @@ from fras_log.keys import Signer
 from fras_log.names import BESIDE, CHECKPOINT, CLOSED, METADATA, PROFILE
 
 CHUNK_BYTES = 1024 * 1024
-_MOST_NS = 2**64 - 1
-_MOST_SEQUENCE = 2**32 - 1
 # As many as a publisher's cache can send again.
 REMEMBERED = 2000
 
@@ -49,16 +47,17 @@ class Stream:
 
     def note(self, header: HeaderFields) -> bool:
         """Take a sample into account; False if it is a copy. `gap` is what is missing before it."""
-        name = (header.seq, header.stamp_ns)
-        if name in self._recent:
+        seq = header.seq
+        name = (seq, header.stamp_ns)
+        recent, order = self._recent, self._order
+        if name in recent:
             return False
-        self._order.append(name)
-        self._recent.add(name)
-        if len(self._order) > REMEMBERED:
-            self._recent.discard(self._order.popleft())
-        expected = header.seq if self._last is None else self._last + 1
-        self.gap = max(0, header.seq - expected)
-        self._last = header.seq
+        order.append(name)
+        recent.add(name)
+        if len(order) > REMEMBERED:
+            recent.discard(order.popleft())
+        last, self._last = self._last, seq
+        self.gap = seq - last - 1 if last is not None and seq > last else 0
         return True
 
 
@@ -116,7 +115,7 @@ class LogFile:
             opening["public_key"] = signer.public.raw.hex()
         self._chain = Chain(first_head(opening, attachments))
         self._definitions: dict[tuple[str, str], Definition] = {}
-        self._channels: dict[Definition, int] = {}
+        self._channels: dict[bytes, int] = {}
         self._schemas: dict[tuple[str, str, bytes], int] = {}
         self._beside: dict[str, str] = {}
         self._writer = Writer(
@@ -150,9 +149,7 @@ class LogFile:
         header = read_header(sample.payload)
         if header is not None and self._is_copy(sample.key, header):
             return header
-        # The file has room for 64 and 32 bits without a sign; the message itself is verbatim.
-        stamp_ns = min(max(header.stamp_ns if header is not None else arrival_ns, 0), _MOST_NS)
-        sequence = (header.seq if header is not None else 0) & _MOST_SEQUENCE
+        stamp_ns, sequence = (arrival_ns, 0) if header is None else (header.stamp_ns, header.seq)
         self.append(self._define(sample), arrival_ns, stamp_ns, sequence, sample.payload)
         return header
 
@@ -227,7 +224,10 @@ class LogFile:
         A copy has number and stamp of a sample that is here; a lower number alone is no reason to
         leave anything out of the log, whoever sent what before it.
         """
-        stream = self._streams.setdefault((key, header.source), Stream())
+        name = (key, header.source)
+        stream = self._streams.get(name)
+        if stream is None:
+            stream = self._streams[name] = Stream()
         if not stream.note(header):
             return True
         self.lost += stream.gap
@@ -240,14 +240,15 @@ class LogFile:
         return self._definitions[name]
 
     def _channel(self, channel: Definition) -> int:
-        if channel not in self._channels:
-            self._channels[channel] = self._writer.register_channel(
+        number = self._channels.get(channel.digest)
+        if number is None:
+            number = self._channels[channel.digest] = self._writer.register_channel(
                 topic=channel.topic,
                 message_encoding=channel.message_encoding,
                 schema_id=self._schema(channel),
                 metadata=dict(channel.metadata),
             )
-        return self._channels[channel]
+        return number
 
     def _schema(self, channel: Definition) -> int:
         if not channel.schema:

@@ -27,6 +27,7 @@ from fras_cli.report.wording import (
     reason_in_words,
     specifications_in_words,
 )
+from fras_log import PublicKey
 
 TEMPLATE = "template.html.j2"
 
@@ -129,9 +130,22 @@ def _numbers(trial: Trial, summary: Summary) -> list[tuple[str, str]]:
         ("Its FE step, p50 / p99", f"{fe.p50:.2f} / {fe.p99:.2f} ms" if fe else "unknown"),
         ("Messages", f"{summary.messages} recorded, {summary.lost} lost"),
     ]
+    rows += [
+        ("Head of the log", summary.head or "none: it was never closed"),
+        ("Signed with key", _signed_by(trial)),
+    ]
     if trial.malformed:
         rows.append(("Malformed messages", str(trial.malformed)))
     return rows
+
+
+def _signed_by(trial: Trial) -> str:
+    """Name the key that the log says it is signed with; only verification tells whether it is."""
+    try:
+        raw = bytes.fromhex(trial.metadata.get("public_key", ""))
+    except ValueError:
+        return "unknown"
+    return f"{PublicKey(raw).fingerprint} (see fras log verify)" if raw else "none"
 
 
 def _or(value: float | str | None, spec: str = "", unit: str = "") -> str:
