@@ -26,8 +26,8 @@ TRIAL = "t-1"
 START_NS = 1_760_000_000_000_000_000
 OPENING = {"trial": TRIAL, "fras_version": "0.0.1", "scenario": 'name = "ä"\n'}
 ATTACHMENTS = {"scenario.toml": b"seed = 1\n" * 20, "mesh": bytes(range(256)) * 3}
-TICKS = 60
-PER_CHUNK = 6
+TICKS = 42
+PER_CHUNK = 5
 """Ticks between two flushes."""
 
 
@@ -56,7 +56,7 @@ def robot(tick: int) -> RobotState:
     return RobotState(tick=tick, arms={}, action=None, holds={}, verdict_tick=tick - 1)
 
 
-def tissue(tick: int, nodes: int = 40) -> TissueState:
+def tissue(tick: int, nodes: int = 16) -> TissueState:
     places = np.random.default_rng(tick).normal(size=(nodes, 3))
     return TissueState(
         tick=tick,
@@ -108,7 +108,7 @@ class Recording:
 
 
 def write_log(path: Path, signer: Signer | None, **opening: str) -> LogFile:
-    """A whole log of `TICKS` ticks: ten chunks, keys that come late, one that nobody knows."""
+    """A whole log of `TICKS` ticks: nine chunks, keys that come late, one that nobody knows."""
     file = LogFile(path, OPENING | opening, ATTACHMENTS, START_NS, signer)
     recording = Recording(file)
     for tick in range(TICKS):
@@ -168,10 +168,14 @@ class Whole:
         ]
 
     def undamaged(self, position: int) -> list[Message]:
-        """The messages of all chunks that this byte is not in."""
+        """The messages of all chunks that this byte is not in.
+
+        A chunk's first two fields say when its messages arrived, as they say themselves.
+        """
         return [
             message
             for chunk, messages in zip(self.chunks, self.per_chunk, strict=True)
             if not chunk.offset <= position < chunk.end
+            or chunk.offset + 9 <= position < chunk.offset + 9 + 16
             for message in messages
         ]

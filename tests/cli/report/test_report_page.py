@@ -13,6 +13,7 @@ import pytest
 from fras_cli.report import read_trial, summarise, write_picture, write_report
 from fras_cli.report.page import render_page
 from fras_common.messages import NoPlan
+from fras_log import LogFile, PublicKey
 
 VOID = {"meta", "br", "hr", "img", "link", "input"}
 
@@ -82,6 +83,28 @@ def test_page_tells_outcome_numbers_plans_and_reasons(page: str) -> None:
         "theatre-1",
     ):
         assert expected in text
+
+
+def test_page_tells_the_head_and_the_key(page: str, story: Any, tmp_path: Path) -> None:
+    assert re.search(r"Head of the log</th><td>[0-9a-f]{64}</td>", page)
+    assert "Signed with key</th><td>none</td>" in page
+    key = PublicKey(bytes(32))
+    for number, (raw, told) in enumerate(
+        {
+            key.raw.hex(): f"{key.fingerprint} (see fras log verify)",
+            "no number": "unknown",
+        }.items()
+    ):
+        path = tmp_path / f"{number}.mcap"
+        metadata = {"trial": story.TRIAL, "scenario": story.to_toml(story.scenario())}
+        log = story.LogWriter(LogFile(path, metadata | {"public_key": raw}, {}, 1))
+        story.write_beginning(log)
+        log.file.flush()
+        trial = read_trial(path)
+        made = render_page(trial, summarise(trial))
+        assert f"Signed with key</th><td>{told}</td>" in made
+        assert "none: it was never closed" in made
+        log.file.abandon()
 
 
 def test_page_holds_three_figures_and_no_notice_of_damage(page: str) -> None:
