@@ -164,6 +164,17 @@ def test_move_cp_is_busy_until_it_is_there(client: Client) -> None:
     assert client.faults == []
 
 
+def test_hold_lifted_before_the_next_tick_stops_a_move(client: Client) -> None:
+    there = Pose(position_m=(0.04, 0.03, 0.055), quaternion_xyzw=DOWN)
+    client.tell(PSM1.move_cp, TipCommand(tip_in_world=there))
+    client.turn_until(lambda: client.last_state(PSM1)[2])
+    client.client.ask(HOLD, HoldRequest(holder="surgeon", reason="x"), lambda _: None, 5.0)
+    client.client.ask(RESUME, ResumeRequest(holder="surgeon", by="cli"), lambda _: None, 5.0)
+    client.turn_until(lambda: not client.last_state(PSM1)[2])
+    x, y, z = client.tips["psm1"][-1].tip_in_world.position_m
+    assert max(abs(x - 0.04), abs(y - 0.03), abs(z - 0.055)) > 1e-3
+
+
 def reasons(client: Client) -> list[tuple[str, str, str]]:
     return [(f.key, f.kind, f.values.get("reason", "")) for f in client.faults]
 

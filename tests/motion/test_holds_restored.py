@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from fras_common.bus import Call
-from fras_common.codec import encode
+from fras_common.bus import Call, MemoryBus, MemoryFabric, RemoteFault
+from fras_common.codec import decode, encode
 from fras_common.errors import FrasError
 from fras_common.messages import (
     HoldRequest,
@@ -17,6 +17,7 @@ from fras_common.messages import (
     OperatingState,
     ResumeRequest,
 )
+from fras_common.service import ServiceHost
 from fras_common.topics import CRTK, HOLD, HOLDS, RECORDER_LAST, RESUME
 from fras_motion.service import MotionService
 from support.shells import ShellBench
@@ -115,7 +116,11 @@ def test_an_answer_that_can_not_be_read_holds_the_arms(bench: Bench) -> None:
     bench.recorder_appears()
     bench.turn_until_ready()
     (holder,) = bench.held()
-    assert holder == "restart"
+    for by in ("executive", holder):
+        with pytest.raises(RemoteFault):
+            bench.answer(RESUME, ResumeRequest(holder=holder, by=by))
+    state: HoldState = bench.answer(RESUME, ResumeRequest(holder=holder, by="monitor"))
+    assert state.holds == {}
 
 
 def test_it_asks_until_it_is_answered(bench: Bench) -> None:
@@ -131,7 +136,10 @@ def test_it_asks_until_it_is_answered(bench: Bench) -> None:
 
 
 def test_each_change_is_told_before_it_is_acknowledged(bench: Bench) -> None:
+    bench.recorder_appears()
+    bench.turn_until_ready()
     said: list[Holds] = bench.heard(HOLDS)
+    said.clear()
     told_at_answer: list[int] = []
 
     def note(answer: Any) -> None:
@@ -141,3 +149,35 @@ def test_each_change_is_told_before_it_is_acknowledged(bench: Bench) -> None:
     bench.client.ask(RESUME, ResumeRequest(holder="cli", by="cli"), note, 5.0)
     assert told_at_answer == [1, 2]
     assert [one.holds for one in said] == [{"cli": "x"}, {}]
+
+
+@pytest.mark.parametrize("driver", ["simulated", "crtk"])
+@pytest.mark.parametrize("holders", [(), ("software",)])
+def test_what_is_held_early_does_not_make_the_recorder_forget(
+    driver: str, holders: tuple[str, ...]
+) -> None:
+    """The recorder tells the last holds it heard, and those must not be the new motion's own."""
+    fabric = MemoryFabric()
+    client = MemoryBus(fabric, "cell", "recorder/test")
+    last = encode(Holds(holds={"surgeon": "bleeding"}))
+
+    def note(said: Holds) -> None:
+        nonlocal last
+        last = encode(said)
+
+    client.subscribe(HOLDS, note)
+    client.serve(RECORDER_LAST, lambda call: call.reply(LastReply(payload=last)))
+    host = ServiceHost("motion")
+    host.attach(MemoryBus(fabric, "cell", "motion/new"))
+    service = MotionService(host, driver)
+    for holder in holders:
+        client.ask(HOLD, HoldRequest(holder=holder, reason="early"), lambda _: None, 5.0)
+    client.announce("alive/recorder")
+    service.wake()
+    while host.drain(0.0):
+        service.wake()
+    held = decode(Holds, last, HOLDS.key).holds
+    assert held["surgeon"] == "bleeding"
+    assert set(holders) <= held.keys()
+    client.close()
+    host.bus.close()

@@ -23,6 +23,7 @@ from fras_common.messages import (
     ResumeRequest,
     RobotState,
     RpcRecord,
+    StateCommand,
     Verdict,
 )
 from fras_common.scenario import RunSection, Scenario, resolve
@@ -30,6 +31,7 @@ from fras_common.service.health import ProcessMeter
 from fras_common.topics import (
     ACTION_RESULT,
     CANCEL,
+    CRTK,
     EXECUTE,
     FAULT,
     HOLD,
@@ -397,3 +399,79 @@ def test_what_stops_an_action_is_counted_by_name(bench: Bench) -> None:
     bench.answer(HOLD, HoldRequest(holder="cli", reason="wait"))
     cancel(bench, "t2")
     assert health(bench).refusals == {"cancel": 1, "force_hard": 1, "hard_latch": 1, "hold": 1}
+
+
+@pytest.mark.parametrize("held", [False, True])
+def test_cancel_for_another_trial_is_answered_and_ends_nothing(bench: Bench, held: bool) -> None:
+    bench.reset()
+    bench.reach()
+    bench.judge(0)
+    if held:
+        bench.answer(HOLD, HoldRequest(holder="surgeon", reason="x"))
+        for _ in range(3):
+            bench.judge(bench.states[-1].tick)
+    reply: CancelReply = bench.answer(CANCEL, CancelRequest(trial="yesterday", reason="forged"))
+    assert reply.tick == bench.states[-1].tick
+    assert bench.results == []
+    if held:
+        bench.answer(RESUME, ResumeRequest(holder="surgeon", by="surgeon"))
+    expected = "interrupted" if held else "succeeded"
+    assert bench.judge_until_result().outcome == expected
+
+
+def test_holder_named_as_motions_own_hold_is_one_of_many(bench: Bench) -> None:
+    bench.reset()
+    bench.reach()
+    bench.judge(0)
+    bench.answer(HOLD, HoldRequest(holder="cancel", reason="x"))
+    said = len(bench.states)
+    for _ in range(5):
+        bench.settle()
+    assert len(bench.states) == said
+    bench.answer(RESUME, ResumeRequest(holder="cancel", by="cancel"))
+    assert bench.judge_until_result().outcome == "interrupted"
+    assert bench.states[-1].holds == {}
+    assert bench.host.refusals["hold"] == 1
+
+
+@pytest.mark.parametrize("holder", ["restart", "crtk/psm1", "arms/psm2"])
+def test_software_lifts_no_hold_of_a_client_that_took_its_name(bench: Bench, holder: str) -> None:
+    states = bench.client.publisher(CRTK[0].state_command)
+    bench.answer(HOLD, HoldRequest(holder=holder, reason="surgeon"))
+    for command in ("home", "pause", "resume"):
+        states.put(StateCommand(command=command))  # type: ignore[arg-type]
+    bench.settle()
+    with pytest.raises(RemoteFault):
+        bench.answer(RESUME, ResumeRequest(holder=holder, by="executive"))
+    state: HoldState = bench.answer(HOLD, HoldRequest(holder="probe", reason=""))
+    assert state.holds == {f"client:{holder}": "surgeon", "probe": ""}
+    bench.answer(RESUME, ResumeRequest(holder="probe", by="probe"))
+    state = bench.answer(RESUME, ResumeRequest(holder=holder, by="monitor"))
+    assert state.holds == {}
+
+
+def test_client_does_not_lift_the_hold_of_an_arms_own_state(bench: Bench) -> None:
+    states = bench.client.publisher(CRTK[0].state_command)
+    states.put(StateCommand(command="disable"))
+    bench.settle()
+    with pytest.raises(RemoteFault, match="holds nothing"):
+        bench.answer(RESUME, ResumeRequest(holder="crtk/psm1", by="crtk/psm1"))
+    state: HoldState = bench.answer(RESUME, ResumeRequest(holder="crtk/psm1", by="cli"))
+    assert state.holds == {}
+
+
+def test_hold_lifted_before_the_loop_looked_stops_the_action(bench: Bench) -> None:
+    bench.reset()
+    bench.reach()
+    bench.judge(0)
+    answers: list[Any] = []
+    bench.client.ask(HOLD, HoldRequest(holder="surgeon", reason="x"), answers.append, 5.0)
+    bench.client.ask(RESUME, ResumeRequest(holder="surgeon", by="cli"), answers.append, 5.0)
+    assert [one.holds for one in answers] == [{"surgeon": "x"}, {}]
+    bench.settle()
+    result = bench.judge_until_result()
+    assert (result.outcome, result.reason) == ("interrupted", "hold")
+    assert result.tick <= 4
+    assert bench.host.refusals["hold"] == 1
+    bench.reset("t2")
+    assert bench.host.refusals["hold"] == 1

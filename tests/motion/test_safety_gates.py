@@ -207,3 +207,5 @@ def test_force_is_relieved_below_the_ratio_only():
     assert force_relieved(0.475, 0.5, 0.95)
     assert not force_relieved(0.4751, 0.5, 0.95)
     assert not force_relieved(nan, 0.5, 0.95)
+    # What is no number travels as a negative one.
+    assert not force_relieved(-1.0, 0.5, 0.95)

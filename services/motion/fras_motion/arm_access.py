@@ -86,6 +86,7 @@ class SimulatedArms:
         self._holds = holds
         self._trial: MotionTrial | None = None
         self._said: tuple[int, Goal | None, dict[str, str]] | None = None
+        self._heeded_holds = 0
         parameters = MotionParameters()
         kinematics = {name: ArmKinematics(base) for name, base in BASES_IN_WORLD.items()}
         home = home_setpoints(kinematics, HOME_TIPS_M, parameters)
@@ -117,9 +118,11 @@ class SimulatedArms:
             controller = self._trial.controller
             self._direct.take_over(controller.snapshot.arms, controller.drivers)
         self._trial = trial if trial is not None and trial.runs else None
+        if self._trial is not None or not self._direct.moving:
+            _, self._heeded_holds, _ = self._holds.look()
         if self._trial is not None:
             return self._say_trial(self._trial, now_s)
-        held = bool(self._holds.current())
+        held = self._is_held()
         wait_s = self._face.heartbeat_in_s(now_s)
         if self._direct.moving:
             wait_s = min(wait_s, self._tick(held=held, now_s=now_s))
@@ -148,10 +151,16 @@ class SimulatedArms:
         if (wait_s := self._pacer.wait_s(now_s)) > 0.0:
             return wait_s
         self._pacer.ticked(now_s)
+        _, self._heeded_holds, _ = self._holds.look()
         for refusal in self._direct.tick(held=held):
             self._holds.hold(_holder(refusal.arm), _FAULT)
             self._host.report_fault(f"{refusal.arm}/{refusal.command}", refusal)
         return self._pacer.wait_s(now_s)
+
+    def _is_held(self) -> bool:
+        """Whether somebody holds the arms, or did since the last tick."""
+        holds, made, _ = self._holds.look()
+        return bool(holds) or made > self._heeded_holds
 
     def _heed_lifted_holds(self) -> None:
         """Let an arm move again whose hold a person lifted: none moves in another state."""

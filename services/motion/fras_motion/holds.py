@@ -9,6 +9,22 @@ from fras_common.errors import FrasError
 LIFTS_ANY: Final = frozenset({"cli", "monitor"})
 """Where a person stands behind the request; software lifts its own holds only."""
 
+CANCELLER: Final = "cancel"
+"""Holder of motion's own hold, by which it brings a cancelled action to rest."""
+RESTART: Final = "restart"
+"""The one holder whose hold the executive lifts."""
+UNREADABLE: Final = "unreadable"
+"""Holder of the hold that stands where the last holds can't be read: for a person to lift."""
+
+_OURS: Final = (CANCELLER, RESTART, UNREADABLE)
+_OURS_BEGIN: Final = ("arms/", "crtk/")
+
+
+def clients_name(holder: str) -> str:
+    """Name under which a client's hold stands: one of motion's own would be lifted by software."""
+    ours = holder in _OURS or holder.startswith(_OURS_BEGIN)
+    return f"client:{holder}" if ours else holder
+
 
 class NotYourHold(FrasError):
     """A hold may be lifted by its owner, or by a person."""
@@ -24,24 +40,32 @@ class Holds:
     Parameters
     ----------
     on_change : callable, optional
-        Gets all holds after each change, in the order of the changes.
+        Gets all holds after each change, in the order of the changes, from `restore` on: told
+        before, the recorder would forget what was held before this process.
     """
 
     def __init__(self, on_change: Callable[[dict[str, str]], None] = lambda holds: None) -> None:
         self._lock = threading.Lock()
         self._on_change = on_change
         self._reasons: dict[str, str] = {}
+        self._restored = False
+        self._made = 0
+        self._last = ("", "")
 
     def hold(self, holder: str, reason: str) -> dict[str, str]:
         """Add a hold; returns all that are in force."""
         with self._lock:
             self._reasons[holder] = reason
+            self._made += 1
+            self._last = (holder, reason)
             return self._changed()
 
     def restore(self, holds: Mapping[str, str]) -> dict[str, str]:
         """Take over what was held before this process; holds of now stand. Returns all."""
         with self._lock:
-            self._reasons = {**holds, **self._reasons}
+            before = {clients_name(one) if one == CANCELLER else one: holds[one] for one in holds}
+            self._reasons = {**before, **self._reasons}
+            self._restored = True
             return self._changed()
 
     def resume(self, holder: str, by: str) -> dict[str, str]:
@@ -58,7 +82,7 @@ class Holds:
             if holder not in self._reasons:
                 names = ", ".join(sorted(self._reasons)) or "nobody"
                 raise UnknownHold(f"{holder!r} holds nothing; held by: {names}", holder=holder)
-            after_restart = by == "executive" and holder == "restart"
+            after_restart = by == "executive" and holder == RESTART
             if by != holder and by not in LIFTS_ANY and not after_restart:
                 raise NotYourHold(
                     f"the hold of {holder!r} is not for {by!r} to lift: ask {holder!r}, "
@@ -69,6 +93,28 @@ class Holds:
             del self._reasons[holder]
             return self._changed()
 
+    def hold_for_client(self, holder: str, reason: str) -> dict[str, str]:
+        """Add a hold that came in from outside, see `clients_name`."""
+        return self.hold(clients_name(holder), reason)
+
+    def resume_for_client(self, holder: str, by: str) -> dict[str, str]:
+        """Lift a hold for someone outside, who speaks for no hold of motion's own; see `resume`.
+
+        Raises
+        ------
+        UnknownHold, NotYourHold
+        """
+        person = by in LIFTS_ANY
+        own = holder in self.current()
+        if not (own if person else by == "executive" and holder == RESTART):
+            holder = clients_name(holder)
+        return self.resume(holder, by if person else clients_name(by))
+
+    def look(self) -> tuple[dict[str, str], int, tuple[str, str]]:
+        """All holds in force, how many were ever made, and holder and reason of the last."""
+        with self._lock:
+            return dict(self._reasons), self._made, self._last
+
     def current(self) -> dict[str, str]:
         """All holds in force."""
         with self._lock:
@@ -76,7 +122,8 @@ class Holds:
 
     def _changed(self) -> dict[str, str]:
         holds = dict(self._reasons)
-        self._on_change(dict(holds))
+        if self._restored:
+            self._on_change(dict(holds))
         return holds
 
     def in_words(self) -> str:

@@ -7,6 +7,7 @@ from fras_common.errors import FrasError
 from fras_common.messages import Holds, LastReply, LastRequest
 from fras_common.service import ServiceHost
 from fras_common.topics import HOLDS, RECORDER_LAST
+from fras_motion.holds import UNREADABLE
 
 __all__ = ["Restoring"]
 
@@ -23,7 +24,7 @@ class Restoring:
     ----------
     host : ServiceHost
     restore : callable
-        Gets the holds.
+        Gets the holds, none or some, once.
     """
 
     def __init__(self, host: ServiceHost, restore: Callable[[Mapping[str, str]], None]) -> None:
@@ -58,16 +59,16 @@ class Restoring:
             self._host.log.warning("holds can't be restored yet", problem=str(answer))
             return
         self._is_done = True
-        if answer.payload:
-            self._restore_from(answer.payload)
-        self._done()
-
-    def _restore_from(self, payload: bytes) -> None:
-        try:
-            holds = decode(Holds, payload, HOLDS.key).holds
-        except MalformedMessage as error:
-            # Nobody can tell any more who held the arms: a person has to look.
-            holds = {"restart": f"the last holds can't be read: {error}"}
+        holds: Mapping[str, str] = _holds_in(answer.payload) if answer.payload else {}
         if holds:
             self._host.log.warning("holds restored", holds=holds)
-            self._restore(holds)
+        self._restore(holds)
+        self._done()
+
+
+def _holds_in(payload: bytes) -> Mapping[str, str]:
+    try:
+        return decode(Holds, payload, HOLDS.key).holds
+    except MalformedMessage as error:
+        # Nobody can tell any more who held the arms: a person has to look, the executive may not.
+        return {UNREADABLE: f"the last holds can't be read: {error}"}

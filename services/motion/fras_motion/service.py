@@ -94,14 +94,18 @@ class MotionService:
         return m.ExecuteReply(accepted=True, reason="")
 
     def _begin_cancel(self, pending: Deferred[m.CancelRequest, m.CancelReply]) -> None:
-        if self._trial is not None and self._trial.name == pending.request.trial:
-            self._trial.cancel(pending.request.reason)
-            self._log.end()
+        trial, request = self._trial, pending.request
+        if trial is None or trial.name != request.trial:
+            # Nothing of it moves the arms; what does is none of its business.
+            pending.reply(m.CancelReply(tick=self._host.tick))
+            return
+        trial.cancel(request.reason)
+        self._log.end()
         self._cancels.append(pending)
 
     def _hold(self, request: m.HoldRequest) -> m.HoldState:
         # On the receiving thread: the stop must not wait behind anything.
-        holds = self._holds.hold(request.holder, request.reason)
+        holds = self._holds.hold_for_client(request.holder, request.reason)
         self._host.post(lambda: self._host.log.info("held", by=request.holder))
         return m.HoldState(holds=holds, tick=self._host.tick)
 
@@ -114,7 +118,7 @@ class MotionService:
         self._arms.restore(holds)
 
     def _resume(self, request: m.ResumeRequest) -> m.HoldState:
-        holds = self._holds.resume(request.holder, request.by)
+        holds = self._holds.resume_for_client(request.holder, request.by)
         self._host.post(lambda: self._host.log.info("hold lifted", of=request.holder))
         return m.HoldState(holds=holds, tick=self._host.tick)
 

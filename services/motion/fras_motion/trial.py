@@ -2,17 +2,13 @@
 
 from collections import Counter
 from collections.abc import Mapping
-from typing import Final
 
 from fras_motion.controller import MotionController
 from fras_motion.drivers import Driver
 from fras_motion.errors import Refused
-from fras_motion.holds import Holds
+from fras_motion.holds import CANCELLER, Holds
 from fras_motion.parameters import MotionParameters
 from fras_motion.states import ActionResult, Advance, Goal, Verdict
-
-CANCELLER: Final = "cancel"
-"""Holder of motion's own hold, by which it brings a cancelled action to rest."""
 
 
 class MotionTrial:
@@ -45,6 +41,7 @@ class MotionTrial:
         self._holds = holds
         self._refusals = refusals
         self._open = True
+        _, self._holds_made, _ = holds.look()
         self.impose_holds()
 
     @property
@@ -96,8 +93,12 @@ class MotionTrial:
         return result
 
     def impose_holds(self) -> bool:
-        """Make the controller's holds those in force; True if that changed anything."""
-        wanted = self._holds.current()
+        """Make the controller's holds those in force; True if that changed anything.
+
+        A hold that was lifted before it was seen here was acknowledged: it stops the action too.
+        """
+        wanted, made, last = self._holds.look()
+        missed, self._holds_made = made > self._holds_made, made
         standing = {
             holder: reason
             for holder, reason in self.controller.snapshot.holds.items()
@@ -109,4 +110,8 @@ class MotionTrial:
                 self.controller.hold(holder, reason)
         for holder in standing.keys() - wanted.keys():
             self.controller.resume(holder)
+        if missed and not wanted:
+            self._refusals["hold"] += 1
+            self.controller.hold(*last)
+            self.controller.resume(last[0])
         return wanted != standing

@@ -54,6 +54,6 @@ def force_relieved(force_n: float, limit_n: float, ratio: float) -> bool:
     Returns
     -------
     bool
-        False also where the force is no number.
+        False also where the force is no number, which the wire tells as a negative one.
     """
-    return force_n <= ratio * limit_n
+    return 0.0 <= force_n <= ratio * limit_n
