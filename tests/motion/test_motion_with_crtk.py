@@ -8,6 +8,7 @@ import pytest
 from fras_common.bus import MemoryBus, RemoteFault
 from fras_common.messages import (
     ActionResult,
+    CancelRequest,
     ExecuteReply,
     ExecuteRequest,
     HoldRequest,
@@ -21,6 +22,7 @@ from fras_common.messages import (
     RobotState,
     ServoJaw,
     ServoJoints,
+    StateCommand,
     Verdict,
 )
 from fras_common.messages.crtk import State
@@ -28,6 +30,7 @@ from fras_common.messages.robot import Joints
 from fras_common.scenario import RunSection, Scenario, resolve
 from fras_common.topics import (
     ACTION_RESULT,
+    CANCEL,
     CRTK,
     EXECUTE,
     HOLD,
@@ -56,12 +59,14 @@ class Arms:
         self.jaws = {name: setpoint.jaw_rad for name, setpoint in HOME.items()}
         self.joints: dict[str, Joints] = {name: setpoint.joints for name, setpoint in HOME.items()}
         self.told = 0
+        self.commands: list[tuple[str, str]] = []
         self._measured_jaw = {keys.arm: bus.publisher(keys.jaw_measured_js) for keys in CRTK}
         self._measured = {keys.arm: bus.publisher(keys.measured_js) for keys in CRTK}
         self._states = {keys.arm: bus.publisher(keys.operating_state) for keys in CRTK}
         for keys in CRTK:
             bus.subscribe(keys.jaw_servo_jp, self._on_jaw(keys.arm))
             bus.subscribe(keys.servo_jp, self._on_joints(keys.arm))
+            bus.subscribe(keys.state_command, self._on_command(keys.arm))
 
     def say_state(self, arm: str, state: State, *, is_homed: bool = True) -> None:
         self._states[arm].put(OperatingState(state=state, is_homed=is_homed, is_busy=False))
@@ -70,6 +75,9 @@ class Arms:
         for arm in self.joints:
             self._measured_jaw[arm].put(JawState(jaw_rad=self.jaws[arm]))
             self._measured[arm].put(JointState(joints=self.joints[arm], joint_velocities=STILL))
+
+    def _on_command(self, arm: str) -> Callable[[StateCommand], None]:
+        return lambda message: self.commands.append((arm, message.command))
 
     def _on_jaw(self, arm: str) -> Callable[[ServoJaw], None]:
         def follow(message: ServoJaw) -> None:
@@ -300,3 +308,42 @@ def test_motion_does_not_speak_for_arms_that_are_not_its_own(bench: Bench) -> No
     sources = {sample.key for sample in said if b"motion/test" in sample.payload}
     assert not sources & keys_of(CRTK)
     assert {PSM1.servo_jp.key, PSM2.jaw_servo_jp.key} <= sources
+
+
+def test_a_stop_between_trials_pauses_the_arms_whoever_leads_them(bench: Bench) -> None:
+    bench.enable()
+    bench.answer(HOLD, HoldRequest(holder="surgeon", reason="stop"))
+    both = [("psm1", "pause"), ("psm2", "pause")]
+    assert bench.arms.commands == both
+    for keys in CRTK:
+        bench.arms.say_state(keys.arm, "PAUSED")
+    bench.settle()
+    # Who leads an arm may enable it: that lifts no stop.
+    bench.arms.say_state("psm1", "ENABLED")
+    bench.settle()
+    assert bench.arms.commands[2:] == [("psm1", "pause")]
+    bench.arms.say_state("psm1", "PAUSED")
+    bench.settle()
+    bench.answer(RESUME, ResumeRequest(holder="surgeon", by="cli"))
+    assert bench.arms.commands[3:] == [("psm1", "resume"), ("psm2", "resume")]
+    bench.enable()
+    assert len(bench.arms.commands) == 5
+
+
+def test_an_arm_that_another_paused_is_not_resumed(bench: Bench) -> None:
+    bench.enable()
+    bench.arms.say_state("psm2", "PAUSED")
+    bench.settle()
+    bench.answer(HOLD, HoldRequest(holder="surgeon", reason="stop"))
+    bench.answer(RESUME, ResumeRequest(holder="surgeon", by="cli"))
+    assert bench.arms.commands == [("psm1", "pause"), ("psm1", "resume")]
+
+
+def test_a_stop_in_a_trial_is_brought_about_by_its_setpoints(bench: Bench) -> None:
+    bench.enable()
+    bench.reset()
+    bench.answer(HOLD, HoldRequest(holder="surgeon", reason="stop"))
+    assert bench.arms.commands == []
+    bench.answer(CANCEL, CancelRequest(trial="t", reason="over"))
+    bench.settle()
+    assert bench.arms.commands == [("psm1", "pause"), ("psm2", "pause")]

@@ -55,6 +55,12 @@ def test_profile_with_senseless_limits_is_refused(speed):
         rest_to_rest(0.1, Limits(speed, 0.2, 4.0), DT)
 
 
+def test_profile_that_takes_longer_than_anyone_waits_is_refused():
+    assert len(rest_to_rest(0.05, Limits(1e-4, 0.2, 4.0), DT).positions) > 25_000
+    with pytest.raises(ProfileImpossible, match="100000 ticks"):
+        rest_to_rest(0.05, Limits(1e-6, 0.2, 4.0), DT)
+
+
 @given(st.floats(-0.05, 0.05))
 def test_brake_rests_within_two_ticks_over_the_shortest_way(velocity):
     position, left = brake(0.0, velocity, 1.25, DT)

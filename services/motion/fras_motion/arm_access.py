@@ -31,6 +31,7 @@ _LEFT_BY = {
     "unhome": ArmStatus(is_homed=False),
 }
 _FAULT = "fault"
+_ARMS = "arms/"
 _IDLE_S = 60.0
 
 
@@ -194,15 +195,23 @@ class SimulatedArms:
 
 
 class RemoteArms:
-    """Arms of another process, under the keys of CRTK; it decides who else may lead them."""
+    """Arms of another process, under the keys of CRTK; it decides who else may lead them.
+
+    A stop must stop them, whoever does: while somebody holds them and no trial leads them, which
+    brings them to rest itself, they are paused.
+    """
 
     def __init__(self, host: ServiceHost, holds: Holds) -> None:
         self._holds = holds
         self._link = CrtkLink(host)
         self._states: dict[str, str] = {}
+        self._told = {keys.arm: host.publisher(keys.state_command) for keys in CRTK}
+        # Told to pause since they last said to be enabled; told so and to be resumed by us.
+        self._pausing: set[str] = set()
+        self._paused: set[str] = set()
         for keys in CRTK:
             # Nothing moves an arm that has not said yet that it may be moved.
-            holds.hold(f"arms/{keys.arm}", "not heard of")
+            holds.hold(f"{_ARMS}{keys.arm}", "not heard of")
             host.subscribe(keys.operating_state, self._watch(keys.arm))
 
     def drivers(self, parameters: MotionParameters, pace: float) -> Mapping[str, Driver]:
@@ -222,15 +231,27 @@ class RemoteArms:
         del holds
 
     def wake(self, trial: MotionTrial | None, now_s: float) -> float:
-        """Nothing is due: the other process says where its arms are."""
-        del trial, now_s
+        """Pause and resume the arms; where they are, the other process says."""
+        del now_s
+        held = any(not holder.startswith(_ARMS) for holder in self._holds.current())
+        led = trial is not None and trial.runs
+        for arm, state in self._states.items():
+            if held and not led and state == "ENABLED" and arm not in self._pausing:
+                self._pausing.add(arm)
+                self._paused.add(arm)
+                self._told[arm].put(m.StateCommand(command="pause"))
+            elif not held and arm in self._paused:
+                self._paused.discard(arm)
+                self._told[arm].put(m.StateCommand(command="resume"))
         return _IDLE_S
 
     def _watch(self, arm: str) -> Callable[[m.OperatingState], None]:
-        holder = f"arms/{arm}"
+        holder = f"{_ARMS}{arm}"
 
         def on_state(state: m.OperatingState) -> None:
             self._states[arm] = state.state
+            if state.state == "ENABLED":
+                self._pausing.discard(arm)
             if not ArmStatus(state.state, state.is_homed).may_move:
                 self._holds.hold(holder, "not homed" if not state.is_homed else state.state.lower())
             elif holder in self._holds.current():

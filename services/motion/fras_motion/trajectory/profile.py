@@ -14,6 +14,9 @@ from fras_common.errors import FrasError
 
 __all__ = ["Limits", "Profile", "ProfileImpossible", "rest_to_rest"]
 
+# To walk through a longer motion takes more seconds than anyone waits for motion's answer.
+_MOST_TICKS = 100_000
+
 
 class ProfileImpossible(FrasError):
     """No time scaling obeys the limits over this distance.
@@ -32,7 +35,7 @@ class ProfileImpossible(FrasError):
     def __init__(self, distance: float, code: int) -> None:
         super().__init__(
             f"no motion profile over {distance} (ruckig result {code}); the distance and the "
-            "limits must be finite and positive",
+            f"limits must be finite and positive, and the motion of {_MOST_TICKS} ticks at most",
             distance=distance,
             code=code,
         )
@@ -89,7 +92,7 @@ def rest_to_rest(distance: float, limits: Limits, dt_s: float) -> Profile:
     Raises
     ------
     ProfileImpossible
-        The distance or a limit is not positive or not a number.
+        The distance or a limit is not positive or not a number, or the motion takes too long.
     """
     generator = ruckig.Ruckig(1)
     request = ruckig.InputParameter(1)
@@ -106,6 +109,8 @@ def rest_to_rest(distance: float, limits: Limits, dt_s: float) -> Profile:
     if code != ruckig.Result.Working or not distance > 0.0:
         raise ProfileImpossible(distance, int(code))
     # A motion that ends a rounding after a tick needs no further tick for it.
+    if not trajectory.duration <= _MOST_TICKS * dt_s:
+        raise ProfileImpossible(distance, int(code))
     ticks = max(1, ceil(trajectory.duration / dt_s - 1e-9))
     samples = [trajectory.at_time(tick * dt_s) for tick in range(1, ticks)]
     return Profile(
