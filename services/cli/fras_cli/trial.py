@@ -1,22 +1,28 @@
 """One trial as the command line sees it: started, followed, ended."""
 
+import queue
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from fras_cli.stack import UsedStack
+from fras_common.bus import NoAnswer
 from fras_common.errors import FrasError
 from fras_common.messages import (
+    CancelRequest,
     Health,
     Plan,
     RobotState,
+    TaskReply,
     TaskRequest,
     TaskStatus,
     Verdict,
 )
 from fras_common.scenario import Scenario
 from fras_common.topics import (
+    CANCEL,
     HEALTH,
     PLAN,
     ROBOT_STATE,
@@ -26,6 +32,7 @@ from fras_common.topics import (
 )
 
 START_TIMEOUT_S = 30.0
+AT_ONCE_S = 0.5
 POLL_S = 0.1
 RATE_WINDOW_S = 1.0
 
@@ -94,9 +101,28 @@ class TrialFollower:
             raise TrialRefused(f"the planner refused the trial: {reply.reason}")
 
     def abort(self, reason: str) -> None:
-        """Ask the planner to end the trial now: the arms stop, the log is closed."""
+        """Ask the planner to end the trial now: the arms stop, the log is closed.
+
+        If it does not answer at once motion is told to stop the arms all the same.
+
+        Raises
+        ------
+        FrasError
+            The planner does not answer at all, or refuses.
+        """
+        bus = self._stack.link.bus
+        answers: queue.SimpleQueue[TaskReply | FrasError] = queue.SimpleQueue()
         request = TaskRequest(command="abort", trial=self._trial, reason=reason)
-        self._stack.link.bus.query(TASK, request, START_TIMEOUT_S)
+        bus.ask(TASK, request, answers.put, START_TIMEOUT_S)
+        try:
+            answer = answers.get(timeout=AT_ONCE_S)
+        except queue.Empty:
+            with suppress(NoAnswer):
+                cancel = CancelRequest(trial=self._trial, reason=reason)
+                bus.query(CANCEL, cancel, START_TIMEOUT_S)
+            answer = answers.get()
+        if isinstance(answer, FrasError):
+            raise answer
 
     def follow(self, show: Callable[[TrialView], None], stop: Callable[[], bool]) -> bool:
         """Show the view until the trial has ended and its log is closed.
