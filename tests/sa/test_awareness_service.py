@@ -11,12 +11,14 @@ from fras_common.bus import RemoteFault
 from fras_common.errors import FrasError
 from fras_common.messages import (
     ContextRequest,
+    FaultRecord,
     ResetRequest,
     TargetRequest,
     Verdict,
 )
 from fras_common.scenario import Scenario, SceneSection
 from fras_common.topics import (
+    FAULT,
     ROBOT_STATE,
     SA_CONTEXT,
     SA_RESET,
@@ -292,3 +294,29 @@ def test_context_says_what_became_of_the_expectations(bench: Bench) -> None:
     (unknown,) = bench.ask(SA_CONTEXT, asking(0, "at(psm1,b(9,9))"))
     assert unknown.remote_kind == "UnknownAtom"
     assert "'at(psm1,b(9,9))'" in str(unknown)
+
+
+def test_state_that_nobody_can_have_come_to_is_refused_and_not_kept(bench: Bench) -> None:
+    faults: list[FaultRecord] = bench.heard(FAULT.of(service="sa"))
+    bench.reset()
+    bench.tick(0)
+    for tick in (1_001, 10**15):
+        bench.robot.put(robot(tick))
+    bench.robot.put(robot(1_000))
+    bench.settle()
+    assert [(fault.kind, fault.tick) for fault in faults] == [
+        ("TooFarAhead", 1_001),
+        ("TooFarAhead", 10**15),
+    ]
+    bench.tick(1)
+    assert bench.verdicts[-1].tick == 1
+
+
+def test_questions_about_ticks_that_never_come_do_not_pile_up(bench: Bench) -> None:
+    bench.reset()
+    bench.tick(0)
+    answers = [bench.ask(SA_CONTEXT, asking(10**15)) for _ in range(120)]
+    refused = [one[0] for one in answers if one]
+    assert len(refused) == 20
+    assert all("TooManyQuestions" in str(one) for one in refused)
+    assert bench.answer(SA_CONTEXT, asking(0)).tick == 0

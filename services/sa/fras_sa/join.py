@@ -3,6 +3,10 @@
 from dataclasses import dataclass
 
 from fras_common.messages import RobotState, TissueState
+from fras_sa.errors import TooFarAhead
+
+AHEAD = 1000
+"""As many states as a publisher keeps for whoever comes late."""
 
 
 @dataclass(frozen=True)
@@ -22,9 +26,16 @@ class TickJoin:
         self._robots: dict[int, RobotState] = {}
 
     def add(self, state: TissueState | RobotState) -> None:
-        """Keep a state until its tick is complete; one of a tick handed out already is dropped."""
+        """Keep a state until its tick is complete; one of a tick handed out already is dropped.
+
+        Raises
+        ------
+        TooFarAhead
+        """
         if state.tick < self._next:
             return
+        if state.tick >= self._next + AHEAD:
+            raise TooFarAhead(state.tick, self._next)
         if isinstance(state, TissueState):
             self._tissues[state.tick] = state
         else:

@@ -19,9 +19,12 @@ from fras_common.topics import (
     VERDICT,
 )
 from fras_sa.awareness import AwarenessError
-from fras_sa.errors import NothingKnown, OtherTrial
+from fras_sa.errors import NothingKnown, OtherTrial, TooManyQuestions
 from fras_sa.trial import WatchedTrial
 from fras_sa.waiting import Waiting
+
+# Each is looked at again with each verdict.
+QUESTIONS = 100
 
 
 class AwarenessService:
@@ -101,6 +104,8 @@ class AwarenessService:
         try:
             self._require_trial(request.trial)
             if trial.problem is None and (trial.verdict is None or trial.tick < request.min_tick):
+                if len(self._pending) >= QUESTIONS:
+                    raise TooManyQuestions(len(self._pending), request.min_tick)
                 self._pending.append(pending)
                 return
             context = trial.context(request)

@@ -70,7 +70,12 @@ class WatchedTrial:
             raise
 
     def see_state(self, state: m.TissueState | m.RobotState) -> None:
-        """Take a state; one of a tick that has been judged changes nothing."""
+        """Take a state; one of a tick that has been judged changes nothing.
+
+        Raises
+        ------
+        TooFarAhead
+        """
         self._join.add(state)
 
     def judge_next(self) -> m.Verdict | None:
