@@ -116,6 +116,8 @@ def _with_nan(view):
         lambda view: dataclasses.replace(view, max_force_n=math.nan),
         lambda view: dataclasses.replace(view, max_force_n=math.inf),
         lambda view: dataclasses.replace(view, max_node_speed_m_s=math.inf),
+        lambda view: dataclasses.replace(view, max_force_n=-1.0),
+        lambda view: dataclasses.replace(view, max_node_speed_m_s=-1.0),
         lambda view: dataclasses.replace(
             view, tool_force_n={"psm1": np.zeros(3), "psm2": np.full(3, math.nan)}
         ),

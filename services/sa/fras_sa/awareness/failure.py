@@ -48,6 +48,8 @@ def tissue_problem(tissue: TissueView, n_nodes: int) -> str:
     if not np.isfinite(tissue.nodes_m).all():
         return "nodes_m is not finite"
     numbers = [tissue.max_force_n, tissue.max_node_speed_m_s]
+    if min(numbers) < 0.0:
+        return "a force or a speed is negative"
     numbers += [float(v) for force in tissue.tool_force_n.values() for v in force]
     return "" if all(map(math.isfinite, numbers)) else "a force or a speed is not finite"
 
