@@ -113,6 +113,7 @@ def _into_limits(joints: Joints) -> Joints:
 def _nearest_turn(roll: float, near: float) -> float:
     """Add full turns towards `near`, but never past the limits of the roll."""
     nearest = roll + 2 * pi * round((near - roll) / (2 * pi))
-    if _ROLL.lower <= nearest <= _ROLL.upper:
+    # At its limit a roll may come out beyond it by a rounding: no reason for a full turn back.
+    if _ROLL.lower - _ROUNDING <= nearest <= _ROLL.upper + _ROUNDING:
         return nearest
     return roll
