@@ -16,7 +16,10 @@ RESTART: Final = "restart"
 UNREADABLE: Final = "unreadable"
 """Holder of the hold that stands where the last holds can't be read: for a person to lift."""
 
-_OURS: Final = (CANCELLER, RESTART, UNREADABLE)
+LOG: Final = "recorder"
+"""Holder of motion's own hold, while the log of a trial that demands one is not being written."""
+
+_OURS: Final = (CANCELLER, RESTART, UNREADABLE, LOG)
 _OURS_BEGIN: Final = ("arms/", "crtk/")
 
 

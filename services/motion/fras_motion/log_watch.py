@@ -3,11 +3,9 @@
 from fras_common.messages import RecorderStatus
 from fras_common.service import ServiceHost
 from fras_common.topics import RECORDER_STATUS
-from fras_motion.holds import Holds
+from fras_motion.holds import LOG, Holds
 
-__all__ = ["HOLDER", "LogWatch"]
-
-HOLDER = "recorder"
+__all__ = ["LogWatch"]
 
 
 class LogWatch:
@@ -46,11 +44,11 @@ class LogWatch:
     def wake(self) -> None:
         """Hold, or lift the hold, as it stands now."""
         problem = self._problem() if self._required_by else ""
-        held = self._holds.current().get(HOLDER)
+        held = self._holds.current().get(LOG)
         if problem and held is None:
-            self._holds.hold(HOLDER, problem)
+            self._holds.hold(LOG, problem)
         elif not problem and held is not None:
-            self._holds.resume(HOLDER, by=HOLDER)
+            self._holds.resume(LOG, by=LOG)
 
     def _problem(self) -> str:
         status = self._status
