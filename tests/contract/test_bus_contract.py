@@ -278,11 +278,15 @@ def test_a_closed_bus_delivers_nothing_and_says_so(open_bus: Open, listen: Liste
 def test_every_call_on_a_closed_bus_raises(open_bus: Open):
     bus = open_bus("sim/1")
     publisher = bus.publisher(SIM_LOG)
+    raw = bus.publisher_raw("any/key", Qos.STATE)
     bus.close()
     request = TargetRequest(trial="t", action="reach", arm="psm1", block="b(1,1)")
     for call in (
         lambda: publisher.put(record("late")),
         lambda: bus.publisher(SIM_LOG),
+        lambda: bus.publisher_raw(SIM_LOG.key, Qos.STATE),
+        lambda: raw.put(b"", "text/plain"),
+        lambda: bus.tokens(1.0),
         lambda: bus.subscribe(SIM_LOG, print),
         lambda: bus.subscribe_raw("**", print),
         lambda: bus.serve(SA_TARGET, print),

@@ -6,6 +6,7 @@ from fras_common.bus.contract import (
     Call,
     NoAnswer,
     Publisher,
+    RawPublisher,
     RawSample,
     RemoteFault,
 )
@@ -19,6 +20,7 @@ __all__ = [
     "MemoryFabric",
     "NoAnswer",
     "Publisher",
+    "RawPublisher",
     "RawSample",
     "RemoteFault",
 ]

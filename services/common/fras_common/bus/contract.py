@@ -16,7 +16,7 @@ from typing import Protocol, TypeVar
 from fras_common.codec import MalformedMessage
 from fras_common.errors import FrasError
 from fras_common.messages import Fault, Header
-from fras_common.topics import Query, Topic
+from fras_common.topics import Qos, Query, Topic
 
 M = TypeVar("M", bound=Header)
 Req = TypeVar("Req")
@@ -68,6 +68,18 @@ class Publisher(Protocol[M]):
         ...
 
 
+class RawPublisher(Protocol):
+    """Publishes bytes as they are: a log's samples keep the header of who sent them first."""
+
+    def put(self, payload: bytes, encoding: str) -> None:
+        """Publish."""
+        ...
+
+    def close(self) -> None:
+        """Undeclare; what it kept for whoever comes later is forgotten. Idempotent."""
+        ...
+
+
 class Call(Protocol[Req_co, Rep_contra]):
     """A query that waits for its answer; exactly one of `reply` and `fail` must be called."""
 
@@ -93,6 +105,10 @@ class Bus(Protocol):
 
     def publisher(self, topic: Topic[M]) -> Publisher[M]:
         """Declare a publisher on a concrete key."""
+        ...
+
+    def publisher_raw(self, key: str, qos: Qos) -> RawPublisher:
+        """Declare a publisher of bytes on any key, in the table or not."""
         ...
 
     def subscribe(self, topic: Topic[M], callback: Callable[[M], None]) -> None:
@@ -127,6 +143,13 @@ class Bus(Protocol):
 
     def watch_tokens(self, callback: Callable[[str, bool], None]) -> None:
         """Report each token that appears (True) or goes (False), those present first."""
+        ...
+
+    def tokens(self, timeout_s: float) -> frozenset[str]:
+        """Ask who is there now and wait for the whole answer; raises `NoAnswer` without a router.
+
+        What was declared or put before, here, has reached the router when it returns.
+        """
         ...
 
     def close(self) -> None:

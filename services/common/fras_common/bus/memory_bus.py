@@ -93,6 +93,11 @@ class MemoryBus:
         self._require_open()
         return _MemoryPublisher(self, topic, Stamper(self._source, self._clock_ns))
 
+    def publisher_raw(self, key: str, qos: Qos) -> "_MemoryRawPublisher":
+        """Declare a publisher of bytes on any key."""
+        self._require_open()
+        return _MemoryRawPublisher(self, key, qos)
+
     def subscribe(self, topic: Topic[M], callback: Callable[[M], None]) -> None:
         """Receive every message of a key or family."""
 
@@ -196,6 +201,13 @@ class MemoryBus:
             for full in self._fabric.tokens[self._cell].values():
                 callback(full, True)
 
+    def tokens(self, timeout_s: float) -> frozenset[str]:
+        """Ask who is there now."""
+        del timeout_s
+        self._require_open()
+        with self._fabric.lock:
+            return frozenset(self._fabric.tokens[self._cell].values())
+
     def close(self) -> None:
         """Leave the fabric; idempotent."""
         if self._closed:
@@ -227,9 +239,18 @@ class MemoryBus:
 
     def carry(self, topic: Topic[Any], sample: RawSample) -> None:
         """Deliver a sample to whoever subscribed, and cache it as its QoS class says."""
+        self.carry_as(topic.qos, sample)
+
+    def forget(self, key: str) -> None:
+        """Drop what is kept of a key for whoever comes later."""
+        with self._fabric.lock:
+            self._fabric.caches[self._cell].pop((id(self), key), None)
+
+    def carry_as(self, qos: Qos, sample: RawSample) -> None:
+        """Deliver a sample in a QoS class."""
         self._require_open()
         with self._fabric.lock:
-            if topic.qos in (Qos.STATE, Qos.EVENT):
+            if qos in (Qos.STATE, Qos.EVENT):
                 slot = (id(self), sample.key)
                 caches = self._fabric.caches[self._cell]
                 caches.setdefault(slot, deque(maxlen=CACHE)).append(sample)
@@ -254,6 +275,19 @@ class _MemoryPublisher(Generic[M]):
             sample = RawSample(self._topic.key, encode(stamped), "application/msgpack")
             self._bus.carry(self._topic, sample)
         return stamped
+
+
+class _MemoryRawPublisher:
+    def __init__(self, bus: MemoryBus, key: str, qos: Qos) -> None:
+        self._bus = bus
+        self._key = key
+        self._qos = qos
+
+    def put(self, payload: bytes, encoding: str) -> None:
+        self._bus.carry_as(self._qos, RawSample(self._key, payload, encoding))
+
+    def close(self) -> None:
+        self._bus.forget(self._key)
 
 
 class _MemoryCall:

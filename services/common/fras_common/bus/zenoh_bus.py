@@ -38,6 +38,7 @@ Rep = TypeVar("Rep")
 CACHE = 1000
 HEARTBEAT_S = 0.1
 ENCODING = zenoh.Encoding("application/msgpack")
+TOKENS = ("alive/**", "ready/**")
 
 # Zenoh's own queue of two batches and 1 ms of patience drop samples whenever its sender thread
 # waits for a processor, and a sample dropped while an earlier loss is being recovered is never
@@ -102,17 +103,25 @@ class ZenohBus:
 
     def publisher(self, topic: Topic[M]) -> "_ZenohPublisher[M]":
         """Declare a publisher on a concrete key."""
+        declared = self._declare_publisher(topic.key, topic.qos)
+        return _ZenohPublisher(self, declared, Stamper(self._source, self._clock_ns))
+
+    def publisher_raw(self, key: str, qos: Qos) -> "_ZenohRawPublisher":
+        """Declare a publisher of bytes on any key."""
+        return _ZenohRawPublisher(self, self._declare_publisher(key, qos))
+
+    def _declare_publisher(self, key: str, qos: Qos) -> Any:
         self.require_open()
-        if topic.qos is Qos.TELEMETRY:
+        if qos is Qos.TELEMETRY:
             declared: Any = self._session.declare_publisher(
-                topic.key,
+                key,
                 encoding=ENCODING,
                 congestion_control=zenoh.CongestionControl.DROP,
                 reliability=zenoh.Reliability.BEST_EFFORT,
             )
-        elif topic.qos is Qos.COMMAND:
+        elif qos is Qos.COMMAND:
             declared = self._session.declare_publisher(
-                topic.key,
+                key,
                 encoding=ENCODING,
                 congestion_control=zenoh.CongestionControl.DROP,
                 reliability=zenoh.Reliability.RELIABLE,
@@ -122,7 +131,7 @@ class ZenohBus:
         else:
             declared = zenoh.ext.declare_advanced_publisher(
                 self._session,
-                topic.key,
+                key,
                 encoding=ENCODING,
                 congestion_control=zenoh.CongestionControl.DROP,
                 reliability=zenoh.Reliability.RELIABLE,
@@ -135,7 +144,13 @@ class ZenohBus:
                 publisher_detection=True,
             )
         self._declared.append(declared)
-        return _ZenohPublisher(self, declared, Stamper(self._source, self._clock_ns))
+        return declared
+
+    def undeclare(self, declared: Any) -> None:
+        """Undeclare one thing before the rest; idempotent."""
+        if declared in self._declared:
+            self._declared.remove(declared)
+            declared.undeclare()
 
     def subscribe(self, topic: Topic[M], callback: Callable[[M], None]) -> None:
         """Receive every message of a key or family."""
@@ -244,10 +259,25 @@ class ZenohBus:
         def deliver(sample: zenoh.Sample) -> None:
             callback(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)
 
-        for key_expr in ("alive/**", "ready/**"):
+        for key_expr in TOKENS:
             self._declared.append(
                 self._session.liveliness().declare_subscriber(key_expr, deliver, history=True)
             )
+
+    def tokens(self, timeout_s: float) -> frozenset[str]:
+        """Ask who is there now and wait for the whole answer."""
+        self.require_open()
+        found: set[str] = set()
+        for key_expr in TOKENS:
+            # The router itself ends the answer; a timeout comes as an error.
+            for reply in self._session.liveliness().get(key_expr, timeout=timeout_s):
+                if reply.ok is None:
+                    raise NoAnswer(key_expr, timeout_s)
+                found.add(str(reply.ok.key_expr))
+        if not self._session.info.routers_zid():
+            # Without one the answer is empty, and comes at once.
+            raise NoAnswer(TOKENS[0], timeout_s)
+        return frozenset(found)
 
     def close(self) -> None:
         """Undeclare everything and close; a session left open would hang the process at exit."""
@@ -279,6 +309,19 @@ class _ZenohPublisher(Generic[M]):
             stamped = self._stamper.stamp(message)
             self._declared.put(encode(stamped))
         return stamped
+
+
+class _ZenohRawPublisher:
+    def __init__(self, bus: ZenohBus, declared: Any) -> None:
+        self._bus = bus
+        self._declared = declared
+
+    def put(self, payload: bytes, encoding: str) -> None:
+        self._bus.require_open()
+        self._declared.put(payload, encoding=zenoh.Encoding(encoding))
+
+    def close(self) -> None:
+        self._bus.undeclare(self._declared)
 
 
 class _ZenohCall:
