@@ -28,6 +28,12 @@ def status(messages: int) -> RecorderStatus:
     )  # fmt: skip
 
 
+def ask_for_ever(bus: Bus) -> None:
+    """Ask until the connection is known to be gone."""
+    while True:
+        assert bus.tokens(0.5) == frozenset()
+
+
 def test_payload_and_encoding_arrive_as_they_were_put(open_bus: Open, listen: Listen):
     heard = listen()
     open_bus("recorder/1").subscribe_raw("**", heard)
@@ -104,8 +110,7 @@ def test_without_a_router_nobody_answers_who_is_there(own_router: Any):
         assert bus.tokens(5.0) == frozenset()
         own_router.stop()
         with pytest.raises(NoAnswer):
-            while True:  # until the connection is known to be gone
-                assert bus.tokens(0.5) == frozenset()
+            ask_for_ever(bus)
     finally:
         bus.close()
         own_router.start()

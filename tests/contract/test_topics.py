@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from fras_common import messages
 from fras_common.codec import decode, encode, json_schema
 from fras_common.messages import Header
-from fras_common.topics import HEALTH, QUERIES, RPC, SERVICES, TOPICS, Query, Topic, topic_of
+from fras_common.topics import HEALTH, QUERIES, RPC, SERVICES, TOOLS, TOPICS, Query, Topic, topic_of
 
 Strategies = Callable[[type[Any]], st.SearchStrategy[Any]]
 
@@ -65,7 +65,7 @@ def test_the_producer_is_a_known_service(topic: Topic[Any]):
 
 @each_query
 def test_the_server_is_a_known_service_and_owns_the_key(query: Query[Any, Any]):
-    assert query.server in SERVICES
+    assert query.server in {*SERVICES, *TOOLS}
     assert query.key.startswith(f"{query.server}/")
 
 

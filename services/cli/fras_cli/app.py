@@ -284,6 +284,65 @@ def audit(
     raise typer.Exit(status)
 
 
+@app.command()
+def replay(
+    log: Annotated[Path, typer.Argument(help="An audit log, or a run's folder.")],
+    cell: Annotated[
+        str, typer.Option(help="Cell to replay into; no service may be there.")
+    ] = "replay",
+    connect: Annotated[
+        str | None,
+        typer.Option(help="Endpoint of a router, tcp/HOST:PORT.", show_default="an own one"),
+    ] = None,
+    rate: Annotated[float, typer.Option(help="Seconds of the log a second, 0.1 to 100.")] = 1.0,
+    fast: Annotated[
+        bool, typer.Option("--as-fast-as-possible", help="As fast as messages go out.")
+    ] = False,
+    loop: Annotated[bool, typer.Option("--loop", help="Begin anew at the end.")] = False,
+    paused: Annotated[bool, typer.Option("--paused", help="Stand still at the start.")] = False,
+    stay: Annotated[
+        bool, typer.Option("--stay", help="Stay at the end until told to stop.")
+    ] = False,
+    first: Annotated[
+        str | None,
+        typer.Option("--from", help="Where to begin: a tick, or seconds.", metavar="TICK|2.5s"),
+    ] = None,
+    last: Annotated[
+        str | None,
+        typer.Option("--to", help="Where to end, that tick included.", metavar="TICK|2.5s"),
+    ] = None,
+    include: Annotated[
+        list[str] | None,
+        typer.Option(help="Replay this key or family (sim/**) only; may be given again."),
+    ] = None,
+    exclude: Annotated[
+        list[str] | None, typer.Option(help="Leave this key or family out; may be given again.")
+    ] = None,
+    remap: Annotated[
+        list[str] | None,
+        typer.Option(help="Send a key, or family, under another name.", metavar="OLD=NEW"),
+    ] = None,
+) -> None:
+    """Play a log back onto the bus: keys in the terminal or queries control it, as it runs."""
+    from fras_cli.replay import UNLIMITED, Wanted
+    from fras_cli.replay import replay as replay_log
+
+    wanted = Wanted(
+        cell,
+        connect,
+        rate=UNLIMITED if fast else rate,
+        loop=loop,
+        paused=paused,
+        stay=stay,
+        first=first,
+        last=last,
+        include=include or (),
+        exclude=exclude or (),
+        remap=remap or (),
+    )
+    raise typer.Exit(replay_log(_log_file(log), wanted, _console()))
+
+
 @app.command(context_settings=SERVICE_ARGUMENTS)
 def bench(
     context: typer.Context,

@@ -19,6 +19,7 @@ from fras_common.errors import FrasError
 from fras_common.scenario import ScenarioError
 from fras_common.service.extras import MissingExtra
 from fras_log.export import OutputExists, OutputIsLog, OutputUnwritable
+from fras_replay.errors import BadKey, BadPlace, BadRate, LiveCell
 from fras_supervisor import (
     BadEndpoint,
     CommandNotFound,
@@ -34,6 +35,9 @@ from fras_supervisor import (
 BAD_INPUT = (
     BadCell,
     BadEndpoint,
+    BadKey,
+    BadPlace,
+    BadRate,
     FolderInUse,
     LogDirUnusable,
     NoFormat,
@@ -47,6 +51,7 @@ BAD_INPUT = (
 STACK_ERRORS = (
     CommandNotFound,
     DownTimeout,
+    LiveCell,
     MissingExtra,
     NoAnswer,
     NoRouter,

@@ -251,6 +251,8 @@ SA_TARGET = Query("sa/target", m.TargetRequest, m.TargetReply, "sa")
 RECORDER_OPEN = Query("recorder/open", m.OpenRequest, m.ResetReply, "recorder")
 RECORDER_CLOSE = Query("recorder/close", m.CloseRequest, m.CloseReply, "recorder")
 RECORDER_LAST = Query("recorder/last", m.LastRequest, m.LastReply, "recorder")
+REPLAY_CONTROL = Query("replay/control", m.ReplayControl, m.ReplayStatus, "replay")
+REPLAY_STATUS = Query("replay/status", m.ReplayStatusRequest, m.ReplayStatus, "replay")
 
 QUERIES: tuple[Query[Any, Any], ...] = (
     TASK,
@@ -267,9 +269,13 @@ QUERIES: tuple[Query[Any, Any], ...] = (
     RECORDER_OPEN,
     RECORDER_CLOSE,
     RECORDER_LAST,
+    REPLAY_CONTROL,
+    REPLAY_STATUS,
 )
 
 SERVICES: tuple[str, ...] = ("sim", "sa", "planner", "motion", "recorder")
+TOOLS: tuple[str, ...] = ("replay",)
+"""Processes that serve queries, too, but belong to no stack."""
 
 
 def topic_of(key: str) -> Topic[Any] | None:

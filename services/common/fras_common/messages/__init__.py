@@ -47,6 +47,12 @@ from fras_common.messages.recorder import (
     RecorderEvent,
     RecorderStatus,
 )
+from fras_common.messages.replay import (
+    ReplayControl,
+    ReplayMark,
+    ReplayStatus,
+    ReplayStatusRequest,
+)
 from fras_common.messages.robot import ActionState, ArmState, RobotState
 from fras_common.messages.sa import (
     Context,
@@ -110,6 +116,10 @@ __all__ = [
     "Quaternion",
     "RecorderEvent",
     "RecorderStatus",
+    "ReplayControl",
+    "ReplayMark",
+    "ReplayStatus",
+    "ReplayStatusRequest",
     "ResetReply",
     "ResetRequest",
     "ResumeRequest",

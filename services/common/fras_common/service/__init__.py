@@ -1,6 +1,6 @@
 """What every service process is made of: arguments, inbox, loop, trial gate, logs, health."""
 
 from fras_common.service.host import INBOX, Deferred, ServiceHost
-from fras_common.service.runner import Service, run_service
+from fras_common.service.runner import Service, run_service, run_shell
 
-__all__ = ["INBOX", "Deferred", "Service", "ServiceHost", "run_service"]
+__all__ = ["INBOX", "Deferred", "Service", "ServiceHost", "run_service", "run_shell"]

@@ -110,6 +110,7 @@ class ServiceHost:
         self._tokens: dict[str, set[str]] = defaultdict(set)
         self._inputs: set[str] = set()
         self._unmet: set[str] = set()
+        self._alive = False
         self._ready = False
         # A plain flag: a signal handler sets it, and an Event's lock is not reentrant.
         self._stopping = False
@@ -242,7 +243,9 @@ class ServiceHost:
 
     def announce_alive(self) -> None:
         """Show that all subscriptions and queries stand; `ready` follows when all inputs do."""
-        self.bus.announce(f"alive/{self.name}")
+        if not self._alive:
+            self._alive = True
+            self.bus.announce(f"alive/{self.name}")
         self._become_ready()
 
     def health(self, meter: ProcessMeter) -> Health:

@@ -147,6 +147,11 @@ def serve(host: ServiceHost, bus: Bus, build: Build, stop: StopFlag) -> None:
         service = build(host)
     except FrasError as error:
         raise CannotStart(str(error)) from error
+    run_shell(host, service, stop)
+
+
+def run_shell(host: ServiceHost, service: Service, stop: StopFlag) -> None:
+    """Announce a shell that is made, and loop until `stop`."""
     health_stop = threading.Event()
     health = threading.Thread(
         target=host.report_health, args=(health_stop,), name="health", daemon=True
