@@ -36,6 +36,7 @@ MARKING = {topic.key: topic for topic in (PLAN, VERDICT, ROBOT_STATE, ACTION_RES
 }
 # A key that the table does not know travels like most.
 UNKNOWN = Qos.STATE
+SCHEMAS = "fras."
 
 
 @dataclass(frozen=True)
@@ -147,9 +148,9 @@ def read_recording(path: Path, selection: Selection) -> Recording:
     BadKey
         The selection does not fit it.
     """
-    opening, keys, damage = _survey(path)
-    if opening is None and not damage:
-        raise ForeignLog(path, f"it has no record `{METADATA}`")
+    opening, keys, ours, damage = _survey(path)
+    if opening is None and not ours:
+        raise ForeignLog(path, f"it has no record `{METADATA}`" + _because(damage))
     if not keys:
         raise NothingToReplay(f"{path}: holds no message" + _because(damage), path=path)
     chosen = selection.choose(keys)
@@ -168,22 +169,25 @@ def _because(damage: Sequence[str]) -> str:
     return f"; it is damaged: {damage[0]}" if damage else ""
 
 
-def _survey(path: Path) -> tuple[dict[str, str] | None, list[str], list[str]]:
-    """Return what the log says of itself, its keys, and what is wrong with it."""
+def _survey(path: Path) -> tuple[dict[str, str] | None, list[str], bool, list[str]]:
+    """Return what the log says of itself, its keys, if they are ours, and what is wrong with it."""
     opening: dict[str, str] | None = None
     keys: dict[str, None] = {}
+    ours = False
     damage: list[str] = []
     for event in scan(path):
         match event:
             case Told(name=name, content=content) if name == METADATA:
                 opening = content
-            case Recorded(topic=topic):
+            case Recorded(topic=topic, schema=schema):
                 keys[topic] = None
+                # Where the damage took the beginning, the schemas tell whose log it was.
+                ours = ours or schema.startswith(SCHEMAS)
             case Broken(offset=offset, text=text):
                 damage.append(f"offset {offset}: {text}")
             case _:
                 pass
-    return opening, list(keys), damage
+    return opening, list(keys), ours, damage
 
 
 def _messages(path: Path) -> Iterator[Recorded]:
