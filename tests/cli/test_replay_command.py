@@ -4,7 +4,6 @@ from array import array
 from pathlib import Path
 
 import pytest
-from support.recordings import Said, short_trial, write_log
 from typer.testing import CliRunner
 
 from fras_cli.app import app
@@ -14,6 +13,7 @@ from fras_cli.replay_keys import command_of, split_keys
 from fras_common.messages import ReplayControl
 from fras_replay import BadPlace, LiveCell, NothingToReplay, Selection, read_recording
 from fras_replay.timeline import Ticks, Timeline
+from support.recordings import Said, short_trial, write_log
 
 
 @pytest.mark.parametrize(

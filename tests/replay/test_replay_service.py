@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support.recordings import short_trial, write_log
 
 from fras_common.bus import MemoryBus, MemoryFabric, RawSample, RemoteFault
 from fras_common.codec import decode
@@ -21,6 +20,7 @@ from fras_common.topics import PLAN, REPLAY_CONTROL, REPLAY_STATUS, RPC
 from fras_replay import LiveCell, Player, ReplayHost, ReplayService, Selection, Settings
 from fras_replay.recording import read_recording
 from fras_replay.service import LINGER_NS
+from support.recordings import short_trial, write_log
 
 MS = 1_000_000
 CELL = "theatre"
