@@ -60,6 +60,7 @@ bench: $(VENV)/.installed-dev ## measure; figures belong into docs/benchmarks.md
 	$(BIN)/fras bench awareness
 	$(BIN)/fras bench motion
 	$(BIN)/fras bench recorder
+	$(BIN)/fras bench replay
 
 clean: ## remove what was built; runs/ stays
 	rm -rf $(VENV) build dist .pytest_cache .ruff_cache .import_linter_cache .hypothesis

@@ -9,6 +9,7 @@ import pytest
 from fras_common.bus import MemoryBus, MemoryFabric, RawSample, RemoteFault
 from fras_common.codec import decode
 from fras_common.messages import (
+    LastReply,
     Plan,
     ReplayControl,
     ReplayStatus,
@@ -16,7 +17,7 @@ from fras_common.messages import (
     RpcRecord,
 )
 from fras_common.service.health import ProcessMeter
-from fras_common.topics import PLAN, REPLAY_CONTROL, REPLAY_STATUS, RPC
+from fras_common.topics import PLAN, RECORDER_LAST, REPLAY_CONTROL, REPLAY_STATUS, RPC
 from fras_replay import LiveCell, Player, ReplayHost, ReplayService, Selection, Settings
 from fras_replay.recording import read_recording
 from fras_replay.service import LINGER_NS
@@ -323,6 +324,60 @@ def test_who_only_listens_may_be_there(stage: Callable[..., Theatre], token: str
     theatre = stage(fabric, rate=0.0)
     theatre.settle()
     assert theatre.played() == pairs()
+
+
+def recorder_in(fabric: MemoryFabric) -> list[Any]:
+    """A recorder that is asked and does not answer yet."""
+    asked: list[Any] = []
+    recorder = MemoryBus(fabric, CELL, "recorder/7f")
+    recorder.serve(RECORDER_LAST, asked.append)
+    recorder.announce("alive/recorder")
+    return asked
+
+
+def test_a_fast_one_waits_for_the_recorder_and_still_answers(
+    stage: Callable[..., Theatre], monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr("fras_replay.service.BURST", 4)
+    monkeypatch.setattr("fras_replay.flow.WINDOW", 8)
+    fabric = MemoryFabric()
+    asked = recorder_in(fabric)
+    theatre = stage(fabric, rate=0.0)
+    while theatre.host.drain(0.0):
+        pass
+    for number in range(1, 4):
+        assert theatre.settle() is None
+        assert len(asked) == number
+        assert theatre.status().messages == min(8 * number, len(short_trial()))
+        asked[-1].reply(LastReply(payload=b""))
+    theatre.settle()
+    assert theatre.played() == pairs()
+
+
+def test_at_its_own_rate_nobody_is_asked(
+    stage: Callable[..., Theatre], monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr("fras_replay.flow.WINDOW", 8)
+    monkeypatch.setattr("fras_replay.flow.QUICK_NS", 50 * MS)
+    fabric = MemoryFabric()
+    asked = recorder_in(fabric)
+    theatre = stage(fabric)
+    theatre.later(198)
+    assert asked == []
+    assert theatre.played() == pairs()
+
+
+def test_before_it_leaves_it_waits_for_the_recorder(stage: Callable[..., Theatre]):
+    fabric = MemoryFabric()
+    asked = recorder_in(fabric)
+    theatre = stage(fabric, rate=0.0, stay=False)
+    while theatre.host.drain(0.0):
+        pass
+    assert theatre.settle() is None
+    theatre.now_ns += 2 * LINGER_NS
+    assert theatre.service.wake() is None
+    asked[0].fail(LiveCell("any", ["other"]))
+    theatre.host.run(theatre.service.wake)  # returns: an error is an answer, too
 
 
 def test_a_service_that_comes_ends_it_before_the_next_message(stage: Callable[..., Theatre]):

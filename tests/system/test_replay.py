@@ -42,8 +42,8 @@ Wait = Callable[[Callable[[], Any], str], Any]
 WAIT_S = 30.0
 # What those say of themselves who record and replay.
 OWN = {
-    "alive", "health/replay", "log/replay", "health/recorder", "log/recorder", "recorder/status",
-    "rpc/recorder/open",
+    "health/replay", "log/replay", "health/recorder", "log/recorder", "recorder/status",
+    "rpc/recorder/open", "rpc/recorder/last",
 }  # fmt: skip
 
 

@@ -26,6 +26,7 @@ BENCHMARKS: dict[str, tuple[str, str]] = {
         "benchmarks.recorder",
         "Writing and verifying a log against the bare library; loss at 50 times a trial's rate.",
     ),
+    "replay": ("benchmarks.replay", "How late a replay's messages go out, and how fast at most."),
     "loop": ("benchmarks.loop", "A tick of all services against three raw Zenoh hops."),
 }
 

@@ -3,6 +3,7 @@
 from array import array
 
 import numpy as np
+from numpy.typing import NDArray
 
 NS_PER_MS = 1e6
 
@@ -22,6 +23,8 @@ class Lateness:
 
     def percentile_ms(self, percent: float) -> float:
         """Return a percentile [ms]; 0 where nothing went out."""
-        if not self._ns:
-            return 0.0
-        return float(np.percentile(np.array(self._ns), percent)) / NS_PER_MS
+        return float(np.percentile(self.ms(), percent)) if self._ns else 0.0
+
+    def ms(self) -> NDArray[np.float64]:
+        """Return all of them, in their order [ms]."""
+        return np.array(self._ns, dtype=np.float64) / NS_PER_MS

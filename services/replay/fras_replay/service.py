@@ -11,6 +11,7 @@ from fras_common.service import ServiceHost
 from fras_common.topics import REPLAY_CONTROL, REPLAY_STATUS, Qos
 from fras_replay.cell import NAME, live
 from fras_replay.errors import LiveCell, NoSuchMark
+from fras_replay.flow import Flow
 from fras_replay.lateness import Lateness
 from fras_replay.player import UNLIMITED, Due, Player
 from fras_replay.recording import NS, Recording
@@ -100,6 +101,7 @@ class ReplayService:
         self._settings = settings
         self._clock_ns = clock_ns
         self._leave_at_ns: int | None = None
+        self._flow = Flow(host)
         self.lateness = Lateness()
         self.intruder: LiveCell | None = None
         self._require_dead(host.bus.tokens(TOKENS_S))
@@ -120,6 +122,8 @@ class ReplayService:
 
     def wake(self) -> float | None:
         """Send what is due; return the seconds until the next message is."""
+        if self._flow.waiting:
+            return None
         if self._leave_at_ns is not None:
             left_ns = self._leave_at_ns - self._clock_ns()
             if left_ns <= 0:
@@ -136,6 +140,7 @@ class ReplayService:
         self._player = due.player
         if due.player.state == "ended" and not self._settings.stay:
             self._leave_at_ns = self._clock_ns() + LINGER_NS
+            self._flow.ask()
             return 0.0
         return self._wait()
 
@@ -262,6 +267,7 @@ class ReplayService:
             self._put(number)
             if rated:
                 self.lateness.note(self._clock_ns() - self._player.due_at_ns(number))
+        self._flow.sent(due.stop - due.first, self._clock_ns())
         self._host.tick = self._recording.timeline.tick(due.player.place(self._clock_ns()))
 
     def _put(self, number: int) -> None:
