@@ -7,6 +7,7 @@ from mcap.writer import Writer
 from msgspec.structs import replace
 
 from fras_common.codec import encode
+from fras_common.messages.sa import Level
 from fras_common.topics import Qos
 from fras_log import ForeignLog, NoSuchLog, NotAnMcap
 from fras_replay.errors import NothingToReplay
@@ -72,6 +73,16 @@ def test_marks_tell_plans_crossings_actions_and_stops(tmp_path: Path):
     assert [recording.mark_at(place) for place in places] == [0, 1, 2, 3, 4, 5]
     assert [recording.mark_before(place, 0) for place in places] == [-1, 0, 1, 2, 3, 4]
     assert recording.mark_before(places[5], 35_000_000) == 3
+    recording.close()
+
+
+def test_a_level_is_marked_where_it_rises_or_changes_and_not_while_it_lasts(tmp_path: Path):
+    levels: list[Level] = ["ok", "soft", "soft", "hard", "ok", "ok", "soft", "invalid"]
+    ticks = [
+        one for tick, level in enumerate(levels) for one in tick_of(tick, tick * 20_000_000, level)
+    ]
+    recording = read(tmp_path, ticks)
+    assert [mark.told.tick for mark in recording.marks] == [1, 3, 6, 7]
     recording.close()
 
 
