@@ -3,7 +3,8 @@
 Records a trial at its own pace, replays it into a cell of its own over a local router, with a
 recorder in a process of its own that hears everything, and takes for each message the time from
 when it was due to when the bus had it. Beside it, in the same minute, the same schedule kept by a
-loop that only sleeps and looks at the clock: what this machine makes of any schedule just now.
+loop that only sleeps and looks at the clock: what this machine makes of any schedule just now; and, where it is allowed, the replay with
+real-time priority, so that it never waits for a processor: how late the replay itself is.
 """
 
 import argparse
@@ -98,6 +99,27 @@ def listening(cell: str, connect: str) -> Generator[None]:
         process.wait(30)
 
 
+@contextmanager
+def real_time() -> Generator[bool]:
+    """Let nothing else of the machine come before this thread, where that is allowed."""
+    before = os.sched_getscheduler(0), os.sched_getparam(0)
+    try:
+        os.sched_setscheduler(0, os.SCHED_RR | os.SCHED_RESET_ON_FORK, os.sched_param(1))
+    except PermissionError:
+        yield False
+        return
+    try:
+        yield True
+    finally:
+        os.sched_setscheduler(0, *before)
+
+
+def undisturbed_ms(recording: Recording, connect: str) -> Figures | None:
+    """Return how late the replay itself is, when it never waits for a processor [ms]."""
+    with real_time() as allowed:
+        return percentiles(play(recording, connect, 1.0)[0]) if allowed else None
+
+
 def play(recording: Recording, connect: str, rate: float) -> tuple[Floats, float]:
     """Replay all of it; returns the lateness [ms] and the time it took [s]."""
     cell, instance = f"bench-{uuid.uuid4().hex[:6]}", "bench"
@@ -132,6 +154,7 @@ def measure(log: Path, runs: int) -> Figures:
                     {
                         "late_ms": percentiles(late),
                         "bare_loop_ms": percentiles(bare),
+                        "late_real_time_ms": undisturbed_ms(recording, connect),
                         "load": round(os.getloadavg()[0], 1),
                         "fast_messages_s": round(len(due_ns) / fast_s),
                         "fast_times_real": round(recording.timeline.duration_ns / NS / fast_s, 1),
@@ -154,12 +177,13 @@ def measure(log: Path, runs: int) -> Figures:
 def show(figures: Figures) -> None:
     print(f"{figures['messages']} messages in {figures['duration_s']} s")
     for number, row in enumerate(figures["runs"], 1):
-        late, bare = row["late_ms"], row["bare_loop_ms"]
+        late, bare, alone = row["late_ms"], row["bare_loop_ms"], row["late_real_time_ms"]
         print(
             f"run {number}: late by {late['p50']} ms p50, {late['p99']} ms p99, {late['max']} ms "
-            f"at most; a bare loop {bare['p50']}, {bare['p99']}, {bare['max']} ms; load "
-            f"{row['load']}; as fast as possible {row['fast_messages_s']} messages a second, "
-            f"{row['fast_times_real']} times real time"
+            f"at most; a bare loop {bare['p50']}, {bare['p99']}, {bare['max']} ms; "
+            + (f"real-time {alone['p50']}, {alone['p99']}, {alone['max']} ms; " if alone else "")
+            + f"load {row['load']}; as fast as possible {row['fast_messages_s']} messages a "
+            f"second, {row['fast_times_real']} times real time"
         )
     print(
         f"median of their p99 {figures['median_p99_ms']} ms, target {figures['target_p99_ms']} ms: "
