@@ -3,8 +3,9 @@
 Records a trial at its own pace, replays it into a cell of its own over a local router, with a
 recorder in a process of its own that hears everything, and takes for each message the time from
 when it was due to when the bus had it. Beside it, in the same minute, the same schedule kept by a
-loop that only sleeps and looks at the clock: what this machine makes of any schedule just now; and, where it is allowed, the replay with
-real-time priority, so that it never waits for a processor: how late the replay itself is.
+loop that only sleeps and looks at the clock: what this machine makes of any schedule just now.
+And, where it is allowed, the replay with real-time priority, so that it never waits for a
+processor: how late the replay itself is.
 """
 
 import argparse

@@ -58,7 +58,7 @@ def plan(reason: str, seq: int = 0) -> Plan:
         trial=TRIAL, seq=seq, source="planner/old", request_id="c1", reason=reason,
         criterion="weighted", goal="visible", ignore_ap=False, tried=[], actions=[action],
         target="", arm="psm1", history=[], cost=[], models=1, ground_s=0.0, solve_s=0.0,
-        explanation=[], no_plan=None,
+        explanation=[], no_plan=None, asp_digest="",
     )  # fmt: skip
 
 

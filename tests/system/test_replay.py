@@ -6,7 +6,7 @@ import subprocess
 import sys
 import uuid
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -43,6 +43,7 @@ WAIT_S = 30.0
 # What those say of themselves who record and replay.
 OWN = {
     "health/replay", "log/replay", "health/recorder", "log/recorder", "recorder/status",
+    "recorder/event",
     "rpc/recorder/open", "rpc/recorder/last",
 }  # fmt: skip
 
@@ -84,7 +85,7 @@ def client(place: tuple[str, str]) -> Iterator[Client]:
 
 
 @contextmanager
-def recorder(cell: str, connect: str) -> Iterator[subprocess.Popen[bytes]]:
+def recorder(cell: str, connect: str) -> Generator[subprocess.Popen[bytes]]:
     command = [sys.executable, "-m", "fras_recorder", "--cell", cell, "--connect", connect]
     process = subprocess.Popen([*command, "--log-level", "ERROR"])
     try:
