@@ -39,7 +39,9 @@ def test_options_reach_it_through_the_command(capfd):
 def test_an_unknown_one_is_named_with_the_known_ones():
     with pytest.raises(
         bench.UnknownBenchmark,
-        match=r"'fee'.*fe, mesh, stress, planner, criteria, awareness, motion, recorder, replay, loop",
+        match=(
+            r"'fee'.*fe, mesh, stress, planner, criteria, awareness, motion, recorder, replay, loop"
+        ),
     ):
         bench.run_benchmark("fee", [])
 

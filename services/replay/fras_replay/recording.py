@@ -24,7 +24,7 @@ from fras_common.topics import (
 )
 from fras_log import ForeignLog
 from fras_log.names import METADATA
-from fras_log.scan import Broken, Recorded, Told, scan
+from fras_log.scan import Broken, Cut, Recorded, Told, scan
 from fras_replay.errors import NothingToReplay
 from fras_replay.marks import MarkFinder
 from fras_replay.selection import Selection
@@ -179,11 +179,11 @@ def _survey(path: Path) -> tuple[dict[str, str] | None, list[str], bool, list[st
         match event:
             case Told(name=name, content=content) if name == METADATA:
                 opening = content
-            case Recorded(topic=topic, schema=schema):
-                keys[topic] = None
+            case Recorded(channel=channel):
+                keys[channel.topic] = None
                 # Where the damage took the beginning, the schemas tell whose log it was.
-                ours = ours or schema.startswith(SCHEMAS)
-            case Broken(offset=offset, text=text):
+                ours = ours or channel.schema.startswith(SCHEMAS)
+            case Broken(offset=offset, text=text) | Cut(offset=offset, text=text):
                 damage.append(f"offset {offset}: {text}")
             case _:
                 pass
@@ -272,7 +272,7 @@ class _Reader:
         self._file.write(message.payload)
         self._bytes += len(message.payload)
         self._index.lines.append(number)
-        encoding = self._encodings.setdefault(message.encoding, len(self._encodings))
+        encoding = self._encodings.setdefault(message.channel.encoding, len(self._encodings))
         self._index.encodings.append(encoding)
         self._index.stops.append(self._bytes)
         if _lasts(message.topic):
