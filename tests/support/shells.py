@@ -24,7 +24,7 @@ class ShellBench:
     """
 
     def __init__(self, name: str, build: Callable[[ServiceHost], Service], client: str) -> None:
-        fabric = MemoryFabric()
+        self.fabric = fabric = MemoryFabric()
         self.client = MemoryBus(fabric, "cell", client)
         self.fabric = fabric
         self.host = ServiceHost(name)

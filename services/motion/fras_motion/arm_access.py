@@ -171,7 +171,8 @@ class SimulatedArms:
                 for command in way_back(self._direct.status(arm)):
                     self._direct.state_command(arm, command)
 
-    def _permit(self, arm: str, command: str) -> None:
+    def _permit(self, arm: str, command: str, source: str) -> None:
+        del source
         if self._trial is not None:
             text = f"trial {self._trial.name!r} leads the arms; wait for its end or abort it"
             raise CommandRefused(arm, command, "trial_runs", text, trial=self._trial.name)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import time
 
+from fras_common.messages import TaskStatus
 from fras_common.service import ServiceHost
-from fras_motion.crtk import DirectControl
+from fras_common.topics import TASK_STATUS
+from fras_motion.crtk import CommandRefused, DirectControl
 from fras_motion.crtk.face import CrtkFace
 from fras_motion.kinematics import BASES_IN_WORLD, HOME_TIPS_M, ArmKinematics
 from fras_motion.pacing import Pacer
@@ -24,9 +26,17 @@ ROBOT = MotionParameters(
     jaw_stop_deceleration_rad_s2=400.0,
 )
 
+# How motion's messages begin to say whose they are; the router's access control sees to it.
+MOTION = "motion/"
+# Phases of a task in which no trial moves the arms.
+OVER = ("ended", "idle")
+
 
 class ArmsService:
-    """Follows servo commands and says a hundred times a second where the arms are."""
+    """Follows servo commands and says a hundred times a second where the arms are.
+
+    While the planner says that a trial runs, only motion leads them.
+    """
 
     def __init__(self, host: ServiceHost) -> None:
         self._host = host
@@ -38,7 +48,20 @@ class ArmsService:
             home_setpoints(kinematics, HOME_TIPS_M, ROBOT),
         )
         self._pacer = Pacer(ROBOT.dt_s, 1.0)
-        self._face = CrtkFace(host, self._direct, kinematics, _permit, self._on_state)
+        self._face = CrtkFace(host, self._direct, kinematics, self._permit, self._on_state)
+        self._trial = ""
+        host.subscribe(TASK_STATUS, self._on_task)
+
+    def _on_task(self, status: TaskStatus) -> None:
+        self._trial = "" if status.phase in OVER else status.trial
+
+    def _permit(self, arm: str, command: str, source: str) -> None:
+        if not self._trial or source.startswith(MOTION):
+            return
+        # Without its executive a trial is over, though nobody could say so.
+        if self._host.present("alive/planner"):
+            text = f"trial {self._trial!r} leads the arms; wait for its end or abort it"
+            raise CommandRefused(arm, command, "trial_runs", text, trial=self._trial)
 
     def _on_state(self, arm: str, command: str) -> None:
         status = self._direct.state_command(arm, command)
@@ -59,8 +82,3 @@ class ArmsService:
 
     def close(self) -> None:
         """Nothing to put in order: the arms stand at their last setpoint."""
-
-
-def _permit(arm: str, command: str) -> None:
-    """Let anyone lead them: whether a trial runs, these arms don't know."""
-    del arm, command

@@ -28,8 +28,8 @@ HEARTBEAT_S = 0.5
 _GRACE_S = 0.5 * PERIOD_S
 _UNIT = 1e-6
 
-Permit = Callable[[str, str], None]
-"""Gets arm and command; raises `CommandRefused` while nobody outside may lead the arms."""
+Permit = Callable[[str, str, str], None]
+"""Gets arm, command and who sent it; raises `CommandRefused` while that one may not lead the arms."""
 OnState = Callable[[str, str], None]
 """Gets arm and state command."""
 
@@ -125,19 +125,19 @@ class CrtkFace:
         return max(0.0, self._due_s - now_s)
 
     def _servo_jp(self, arm: str, command: m.ServoJoints) -> None:
-        self._permit(arm, "servo_jp")
+        self._permit(arm, "servo_jp", command.source)
         self._direct.servo_jp(arm, command.joints)
 
     def _servo_cp(self, arm: str, command: m.TipCommand) -> None:
-        self._permit(arm, "servo_cp")
+        self._permit(arm, "servo_cp", command.source)
         self._direct.servo_cp(arm, _pose(arm, "servo_cp", command))
 
     def _move_cp(self, arm: str, command: m.TipCommand) -> None:
-        self._permit(arm, "move_cp")
+        self._permit(arm, "move_cp", command.source)
         self._direct.move_cp(arm, _pose(arm, "move_cp", command))
 
     def _servo_jaw(self, arm: str, command: m.ServoJaw) -> None:
-        self._permit(arm, "jaw/servo_jp")
+        self._permit(arm, "jaw/servo_jp", command.source)
         self._direct.servo_jaw(arm, command.jaw_rad)
 
 
