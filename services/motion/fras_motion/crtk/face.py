@@ -29,7 +29,7 @@ _GRACE_S = 0.5 * PERIOD_S
 _UNIT = 1e-6
 
 Permit = Callable[[str, str, str], None]
-"""Gets arm, command and who sent it; raises `CommandRefused` while that one may not lead the arms."""
+"""Gets arm, command and sender; raises `CommandRefused` while that one may not lead the arms."""
 OnState = Callable[[str, str], None]
 """Gets arm and state command."""
 
