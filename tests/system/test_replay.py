@@ -1,6 +1,9 @@
 """A real trial replayed over a real router: recorded again it is the same; asked, it obeys."""
 
+import contextlib
 import os
+import pty
+import select
 import signal
 import subprocess
 import sys
@@ -243,3 +246,60 @@ def test_killed_it_leaves_no_process(recorded_trial: Path, fras: Fras, wait_unti
     os.kill(command.process.pid, signal.SIGKILL)
     command.end()
     wait_until(command.alone, "all processes gone")
+
+
+class Terminal:
+    """A `fras` command on a terminal of its own."""
+
+    def __init__(self, *arguments: str) -> None:
+        self.pid, self._fd = pty.fork()
+        if self.pid == 0:
+            os.execv(sys.executable, [sys.executable, "-m", "fras_cli", *arguments])
+        self._text = b""
+
+    def until(self, words: str) -> None:
+        """Wait until `words` have been shown since the last call."""
+        wanted = words.encode()
+        while wanted not in self._text:
+            readable = select.select([self._fd], [], [], WAIT_S)[0]
+            assert readable, f"never showed {words!r}: {self._text[-500:]!r}"
+            self._text += os.read(self._fd, 4096)
+        self._text = self._text[self._text.index(wanted) + len(wanted) :]
+
+    def press(self, keys: str) -> None:
+        os.write(self._fd, keys.encode())
+
+    def end(self) -> int:
+        """Wait for its end, reading what it still says."""
+        with contextlib.suppress(OSError):  # what Linux gives at the end of a terminal
+            while os.read(self._fd, 4096):
+                pass
+        os.close(self._fd)
+        return os.waitstatus_to_exitcode(os.waitpid(self.pid, 0)[1])
+
+
+def test_keys_of_the_terminal(
+    recorded_trial: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    monkeypatch.setenv("COLUMNS", "160")
+    terminal = Terminal("replay", str(recorded_trial), "--paused", "--cell", "keys")
+    terminal.until("space play/pause")
+    terminal.until("paused 0.00 s")
+    terminal.press("n")
+    terminal.until("tick 0 of ")
+    terminal.press("\x1b[C")
+    terminal.until("tick 1 of ")
+    terminal.press("p")
+    terminal.until("tick 0 of ")
+    terminal.press("]]")
+    terminal.until("| action_")
+    terminal.press("[")
+    terminal.until("| ")
+    terminal.press("-")
+    terminal.until("rate 0.5")
+    terminal.press(" ")
+    terminal.until("playing")
+    terminal.press("q")
+    terminal.until(" messages")
+    assert terminal.end() == 0

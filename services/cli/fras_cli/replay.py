@@ -206,7 +206,7 @@ def _run(
             soft_wrap=True,
         )
         if sys.stdin.isatty():
-            console.print(HELP, style="dim", highlight=False)
+            console.print(HELP, style="dim", highlight=False, soft_wrap=True)
 
         def on_key(key: bytes) -> None:
             host.post(lambda: _told(service, key))

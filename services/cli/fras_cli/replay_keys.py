@@ -2,6 +2,7 @@
 
 import os
 import select
+import shutil
 import sys
 import termios
 import threading
@@ -97,8 +98,9 @@ def _watch(
             for key in split_keys(data):
                 on_key(key)
         if draws:
-            width = os.get_terminal_size(sys.stderr.fileno()).columns
-            sys.stderr.write(f"\r{line()[: max(0, width - 1)]}\x1b[K")
+            # Some terminals say that they have no columns; this then takes 80.
+            width = shutil.get_terminal_size().columns
+            sys.stderr.write(f"\r{line()[: width - 1]}\x1b[K")
             sys.stderr.flush()
     if draws:
         sys.stderr.write("\n")
