@@ -16,8 +16,8 @@ TIMEOUT_S = 2.0
 class Flow:
     """Counts what goes out, and asks the recorder, if there is one, whether it has come so far.
 
-    Its answer to a question is given after all that it heard before. (Measured without: of 42,400
-    messages, sent in 1.5 s, a recorder got 10,700.)
+    Its answer to a question is given after all that it heard before. (Measured on 42,400 messages,
+    as fast as possible: without this a recorder got 10,700 of them, with it all, both within 4 s.)
 
     Parameters
     ----------

@@ -21,8 +21,9 @@ TOKENS_S = 5.0
 BURST = 64
 # A sleeper is woken 0.1 ms late or so, so it looks at the clock for the last of its way. No longer
 # than that: who spins uses its share of a busy processor up, and is then made to wait for 4 ms in
-# mid-schedule (measured: p99 at 0 / 0.1 / 0.5 / 2 ms of spinning 3.0 / 3.1 / 4.1 / 4.3 ms beside
-# other work, median 0.12 / 0.05 / 0.05 / 0.09 ms).
+# mid-schedule (measured beside other work, one to four runs each: with 0 / 0.1 / 0.5 / 2 ms of
+# spinning p99 3.0 to 5.2 / 3.1 to 3.2 / 2.6 to 5.3 / 4.3 ms, and 2 ms or so late already for one
+# message in 10 with 0.5 ms; median 0.13 / 0.05 / 0.05 / 0.09 ms).
 SPIN_NS = 100_000
 # Who lost something as fast as it went learns so from a heartbeat (0.1 s), and asks for it.
 LINGER_NS = NS // 2
