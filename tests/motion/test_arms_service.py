@@ -111,7 +111,7 @@ def test_each_tick_at_that_rate_is_said_however_unevenly_it_comes(
     parameters, said = MotionParameters(), Said()
     direct = DirectControl(parameters, KINEMATICS, simulated_drivers(parameters, KINEMATICS), HOME)
     host: Any = said
-    face = CrtkFace(host, direct, KINEMATICS, lambda arm, command: None, lambda arm, command: None)
+    face = CrtkFace(host, direct, KINEMATICS, lambda *_: None, lambda *_: None)
     late_s = np.random.default_rng(1).uniform(0.0, jitter_s, 2000)
     snapshot = direct.snapshot(held=False)
     for number, late in enumerate(late_s):
