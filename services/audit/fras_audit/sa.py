@@ -122,14 +122,17 @@ class _Audit:
         """Answer again what was asked at this tick."""
         for place, (ticks, request, reply, seq) in enumerate(self._asked):
             if tick in ticks:
+                # A question may have come between two ticks: then either may be its moment.
+                is_last = tick == ticks[-1]
+                where = f"{request.action}({request.arm},{request.block}) at tick {tick}"
                 try:
                     derived = watched.target(request)
-                except FrasError:
+                except FrasError as error:
+                    if is_last:
+                        self._targets.surplus(where, f"a target; refused again: {error}", seq)
                     continue
-                # A question may have come between two ticks: then either may be its moment.
-                if tick < ticks[-1] and derived != reply:
+                if not is_last and derived != reply:
                     continue
-                where = f"{request.action}({request.arm},{request.block}) at tick {tick}"
                 self._targets.compare(where, reply, derived, seq)
                 self._asked[place] = (range(0), request, reply, seq)
 

@@ -8,8 +8,8 @@ from math import acos, dist, sin, sqrt
 import numpy as np
 
 from fras_motion.drivers import Setpoint
-from fras_motion.kinematics import JOINTS, ArmKinematics, Pose, Quaternion
-from fras_motion.trajectory import Limits, Line, Profile
+from fras_motion.kinematics import ArmKinematics, Pose, Quaternion
+from fras_motion.trajectory import Limits, Line, Profile, limits_for_slopes
 
 __all__ = ["TurningStroke", "limits_along", "path_length", "slerp"]
 
@@ -18,10 +18,6 @@ _LEVER_M = 0.05
 _SAMPLES = 33
 # Between the samples the derivatives may be a little larger than at them.
 _RESERVE = 0.9
-# A joint that stands still on the way limits nothing.
-_FLAT = 1e-9
-_SPEEDS = np.array([joint.speed for joint in JOINTS])
-_ACCELERATIONS = np.array([joint.acceleration for joint in JOINTS])
 
 
 def _angle(start: Quaternion, end: Quaternion) -> float:
@@ -158,12 +154,4 @@ def limits_along(
         rows.append(joints)
     spacing = length / (_SAMPLES - 1)
     slopes = np.diff(np.array(rows), axis=0) / spacing
-    slope = np.maximum(np.abs(slopes).max(axis=0), _FLAT)
-    curvature = np.maximum(np.abs(np.diff(slopes, axis=0)).max(axis=0) / spacing, _FLAT)
-    speed = min(
-        wished.speed,
-        _RESERVE * float((_SPEEDS / slope).min()),
-        sqrt(0.5 * _RESERVE * float((_ACCELERATIONS / curvature).min())),
-    )
-    left = _RESERVE * _ACCELERATIONS - curvature * speed**2
-    return Limits(speed, min(wished.acceleration, float((left / slope).min())), wished.jerk)
+    return limits_for_slopes(slopes, spacing, wished, _RESERVE)

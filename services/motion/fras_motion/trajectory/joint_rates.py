@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from math import sqrt
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fras_motion.kinematics import JOINTS, ArmKinematics, Pose, Quaternion
 
 from .line import Line
 from .profile import Limits
 
-__all__ = ["within_joint_rates"]
+__all__ = ["limits_for_slopes", "within_joint_rates"]
 
 _SAMPLES = 33
 # Between the samples the derivatives may be a little larger than at them.
@@ -65,13 +67,37 @@ def within_joint_rates(
             for s in arc
         ]
     )
+    return limits_for_slopes(slopes, float(arc[1]), limits, _RESERVE)
+
+
+def limits_for_slopes(
+    slopes: NDArray[np.floating[Any]], spacing: float, limits: Limits, reserve: float
+) -> Limits:
+    """Lower the limits along a path whose joints' derivatives are known at places of it.
+
+    Parameters
+    ----------
+    slopes : ndarray, shape (n_places, 6), float64
+        dq/ds of each joint [rad or m per path unit].
+    spacing : float
+        From a place to the next [path unit].
+    limits : Limits
+        What is wished along the path.
+    reserve : float
+        Share of the joints' limits that may be used: between the places more may be needed.
+
+    Returns
+    -------
+    Limits
+        At most what was wished; the jerk is kept. The formula: see `within_joint_rates`.
+    """
     slope = np.maximum(np.abs(slopes).max(axis=0), _FLAT)
-    curvature = np.maximum(np.abs(np.diff(slopes, axis=0)).max(axis=0) / float(arc[1]), _FLAT)
+    curvature = np.maximum(np.abs(np.diff(slopes, axis=0)).max(axis=0) / spacing, _FLAT)
     speed = min(
         limits.speed,
-        _RESERVE * float((_SPEEDS / slope).min()),
-        sqrt(0.5 * _RESERVE * float((_ACCELERATIONS / curvature).min())),
+        reserve * float((_SPEEDS / slope).min()),
+        sqrt(0.5 * reserve * float((_ACCELERATIONS / curvature).min())),
     )
-    left = _RESERVE * _ACCELERATIONS - curvature * speed**2
+    left = reserve * _ACCELERATIONS - curvature * speed**2
     acceleration = min(limits.acceleration, float((left / slope).min()))
     return Limits(speed, acceleration, limits.jerk)
