@@ -21,7 +21,7 @@ from fras_audit.recorded import reply_of
 from fras_cli.audit import UnknownService, audit, other_rules
 from fras_cli.failures import exit_status
 from fras_cli.trial import TrialView
-from fras_common.codec import encode
+from fras_common.codec import decode, encode
 from fras_common.messages import (
     ActionResult,
     Array,
@@ -366,6 +366,20 @@ def test_an_answer_to_a_goal_that_motion_did_not_give(
     assert first is not None
     assert (first.path, first.recorded, first.derived) == ("accepted", False, True)
     assert any("answered otherwise" in note for note in tally_of(report, "robot states").notes)
+
+
+def of_no_block(mirror: RpcRecord) -> RpcRecord:
+    asked = decode(TargetRequest, bytes(mirror.request), mirror.key)
+    forged = msgspec.structs.replace(asked, action="reach", block="b(99,99)")
+    return msgspec.structs.replace(mirror, request=msgspec.Raw(encode(forged)))
+
+
+def test_a_target_of_a_block_that_there_is_not(logs: dict[str, Path], tmp_path: Path) -> None:
+    log = rewrite(logs["exposed"], tmp_path / "forged.mcap", "rpc/sa/target", of_no_block)
+    targets = tally_of(audited(log, "sa"), "targets")
+    assert targets.first is not None
+    assert "refused again" in str(targets.first)
+    assert "b(99,99)" in str(targets.first)
 
 
 def test_a_hold_that_nobody_asked_for(logs: dict[str, Path], tmp_path: Path) -> None:
