@@ -12,6 +12,7 @@ from fras_common.codec import decode
 from fras_common.errors import FrasError
 from fras_common.messages import (
     HoldRequest,
+    Holds,
     HoldState,
     LogRecord,
     RpcRecord,
@@ -22,7 +23,8 @@ from fras_common.messages import (
 from fras_common.service import Deferred, ServiceHost
 from fras_common.service.health import ProcessMeter
 from fras_common.service.host import INBOX
-from fras_common.topics import HOLD, LOG, RPC, SA_TARGET, TASK_STATUS, VERDICT, Qos, Topic
+from fras_common.topics import HOLD, HOLDS, LOG, RPC, SA_TARGET, TASK_STATUS, VERDICT, Qos, Topic
+from support.verdicts import verdict
 
 Ask = Callable[..., list[Any]]
 
@@ -32,15 +34,6 @@ REPLY = TargetReply(position_m=(0.1, 0.2, 0.3))
 
 class Unreachable(FrasError):
     pass
-
-
-def verdict(tick: int, trial: str = "t-1") -> Verdict:
-    return Verdict(
-        tick=tick, trial=trial, level="ok", ok=True, reason="", max_force_n=0.1, limit_n=0.5,
-        hard_limit_n=1.0, visibility=0.0, visible=False, max_height=[], force_rate_n_s=0.0,
-        crossing_tick=-1, max_node_speed_m_s=0.0,
-        grasped={},
-    )  # fmt: skip
 
 
 def refuse(_: TargetRequest) -> TargetReply:
@@ -67,16 +60,37 @@ def test_messages_are_handled_by_the_loop_in_order_of_arrival(bench: Any):
     assert host.health(ProcessMeter()).received == 3
 
 
-def test_a_full_inbox_drops_and_counts(bench: Any):
-    host = bench.host("motion")
-    done: list[int] = []
+def test_what_has_no_room_is_dropped_and_counted_and_costs_no_other_key(bench: Any):
+    host = bench.host("planner")
+    handled: list[str] = []
+    host.subscribe(LOG, lambda message: handled.append(message.event))
+    host.subscribe(HOLDS, lambda message: handled.append("holds"))
+    flood = bench.bus("sim/1").publisher(LOG.of(service="sim"))
     for number in range(INBOX + 7):
-        host.post(lambda number=number: done.append(number))
-    assert host.health(ProcessMeter()).queue_depth == INBOX
+        flood.put(LogRecord(level="warning", event=str(number), fields={}))
+    bench.bus("motion/1").publisher(HOLDS).put(Holds(holds={}))
+    assert host.health(ProcessMeter()).queue_depth == INBOX + 1
     bench.settle()
-    assert done == list(range(INBOX))
+    assert handled == [*map(str, range(INBOX)), "holds"]
     assert host.health(ProcessMeter()).queue_dropped == 7
     assert host.health(ProcessMeter()).queue_depth == 0
+    # There is room again.
+    flood.put(LogRecord(level="warning", event="later", fields={}))
+    bench.settle()
+    assert handled[-1] == "later"
+
+
+def test_what_a_service_asked_for_is_never_dropped(bench: Any):
+    host = bench.host("planner")
+    bench.host("sa").serve(SA_TARGET, lambda request: REPLY)
+    host.subscribe(LOG, lambda message: None)
+    flood = bench.bus("sim/1").publisher(LOG.of(service="sim"))
+    for _ in range(INBOX + 1):
+        flood.put(LogRecord(level="warning", event="flood", fields={}))
+    answers: list[Any] = []
+    host.bus.ask(SA_TARGET, REQUEST, lambda answer: host.post(lambda: answers.append(answer)), 5.0)
+    bench.settle()
+    assert answers == [REPLY]
 
 
 def test_the_loop_stops_even_when_its_inbox_is_full(bench: Any):
@@ -182,9 +196,9 @@ def test_what_the_gate_drops_is_no_gap(bench: Any):
 
 
 def test_keys_of_one_family_are_no_gaps_to_each_other(bench: Any):
-    motion, host = bench.host("motion"), bench.host("cli")
+    motion, sa, host = bench.host("motion"), bench.host("sa"), bench.host("cli")
     motion.serve(HOLD, lambda request: HoldState(holds={}, tick=0))
-    motion.serve(SA_TARGET, lambda request: REPLY)
+    sa.serve(SA_TARGET, lambda request: REPLY)
     asker = bench.bus("planner/1")
 
     def ask(query: Any, request: Any) -> None:
@@ -342,3 +356,14 @@ def test_a_malformed_request_never_reaches_the_handler(bench: Any, outcome: Ask)
     assert got[0].remote_kind == "MalformedMessage"
     assert host.health(ProcessMeter()).malformed == 1
     assert mirrored == []
+
+
+def test_what_the_loop_answers_is_mirrored_before_it_is_answered(bench: Any):
+    """Nothing that was done upon an answer may stand in a log without it, whoever is killed."""
+    host, mirrored = bench.host("sa"), mirrors(bench)
+    host.serve(SA_TARGET, lambda request: REPLY)
+    told: list[int] = []
+    bench.bus("motion/1").ask(SA_TARGET, REQUEST, lambda answer: told.append(len(mirrored)), 5.0)
+    host.post(host.stop)
+    host.run(lambda: None)
+    assert told == [1]

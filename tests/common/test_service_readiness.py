@@ -8,20 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fras_common.messages import LogRecord, Verdict
+from fras_common.messages import LogRecord
 from fras_common.service import ServiceHost
 from fras_common.service.build import build_of_this_process
 from fras_common.service.health import ProcessMeter
 from fras_common.topics import HEALTH, LOG, VERDICT
-
-
-def verdict(tick: int, trial: str = "t-1") -> Verdict:
-    return Verdict(
-        tick=tick, trial=trial, level="ok", ok=True, reason="", max_force_n=0.1, limit_n=0.5,
-        hard_limit_n=1.0, visibility=0.0, visible=False, max_height=[], force_rate_n_s=0.0,
-        crossing_tick=-1, max_node_speed_m_s=0.0,
-        grasped={},
-    )  # fmt: skip
+from support.verdicts import verdict
 
 
 def ready(bench: Any, name: str) -> bool:

@@ -12,11 +12,11 @@ import pytest
 
 from fras_common.bus.zenoh_bus import ZenohBus
 from fras_common.errors import FrasError
+from fras_common.extras import MissingExtra, require_extra
 from fras_common.messages import LogRecord
 from fras_common.service import ServiceHost, runner
-from fras_common.service.extras import MissingExtra, require_extra
 from fras_common.service.runner import CannotStart, parse_arguments, run_service, serve
-from fras_common.service.signals import StopFlag
+from fras_common.signals import StopFlag
 from fras_common.topics import LOG, VERDICT
 
 NO_ROUTER = "tcp/127.0.0.1:1"
@@ -33,6 +33,11 @@ log.error("gone", who={"sa"})
 print([(r.level, r.event, r.fields["by_s"] if "by_s" in r.fields else "") for r in records])
 print(records[0].fields["service"])
 """
+
+
+def reporting() -> set[threading.Thread]:
+    """Threads that say how a service is; other tests may have left services that run."""
+    return {thread for thread in threading.enumerate() if thread.name == "health"}
 
 
 class Recorded:
@@ -111,10 +116,11 @@ def test_a_service_that_fails_is_closed_all_the_same(bench: Any):
         built.append(Broken(host))
         return built[0]
 
+    before = reporting()
     with pytest.raises(ZeroDivisionError):
         serve(host, bench.bus("sim/1"), build, StopFlag())
     assert built[0].events == ["close"]
-    assert not any(thread.name == "health" for thread in threading.enumerate())
+    assert reporting() <= before
 
 
 @pytest.mark.usefixtures("handlers")
@@ -152,9 +158,10 @@ def test_a_shell_that_can_not_be_made_says_why_and_leaves_nothing(bench: Any):
     def build(host: ServiceHost) -> Recorded:
         raise FrasError("rules.lp:3: syntax error")
 
+    before = reporting()
     with pytest.raises(CannotStart, match=r"rules\.lp:3: syntax error"):
         serve(ServiceHost("sim"), bench.bus("sim/1"), build, StopFlag())
-    assert not any(thread.name == "health" for thread in threading.enumerate())
+    assert reporting() <= before
 
 
 def test_an_extra_that_is_there_is_no_matter():

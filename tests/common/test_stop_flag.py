@@ -8,10 +8,10 @@ import threading
 
 import pytest
 
-from fras_common.service.signals import StopFlag
+from fras_common.signals import StopFlag, silent_interrupt
 
 WAITER = """
-from fras_common.service.signals import StopFlag
+from fras_common.signals import StopFlag
 stop = StopFlag()
 stop.install()
 stop.on_set = lambda: print("asked", flush=True)
@@ -23,7 +23,7 @@ print("set" if stop.is_set() else "unset", flush=True)
 
 STUCK = """
 import signal
-import fras_common.service.signals as signals
+import fras_common.signals as signals
 signals.GRACE_S = 0.05
 stop = signals.StopFlag()
 stop.install()
@@ -35,7 +35,7 @@ while True:
 # A lock that is not reentrant would stand still here sooner or later.
 HAIL = """
 import signal
-from fras_common.service.signals import StopFlag
+from fras_common.signals import StopFlag
 flag = StopFlag()
 signal.signal(signal.SIGALRM, lambda number, frame: flag.set())
 print("up", flush=True)
@@ -117,3 +117,18 @@ def test_all_who_wait_are_woken():
         waiter.join(10.0)
         assert not waiter.is_alive()
     assert stop.is_set()
+
+
+def test_an_interrupt_raises_again_once_libraries_are_loaded():
+    before = signal.getsignal(signal.SIGINT)
+    try:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        with silent_interrupt():
+            assert signal.getsignal(signal.SIGINT) is signal.SIG_DFL
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+        # Whoever is to ignore it, as a job in the background, still does.
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        with silent_interrupt():
+            assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -1,5 +1,6 @@
 """What the contract tests share: both buses behind one fixture, and strategies for messages."""
 
+import re
 import socket
 import threading
 import types
@@ -13,7 +14,7 @@ import numpy as np
 import pytest
 from hypothesis import strategies as st
 
-from fras_common.bus import Bus, MemoryBus, MemoryFabric
+from fras_common.bus import Bus, MemoryBus, MemoryFabric, RawSample
 from fras_common.bus.contract import OnMalformed
 from fras_common.bus.zenoh_bus import ZenohBus, route
 from fras_common.messages import Array
@@ -35,7 +36,7 @@ class Router:
 
     def start(self) -> None:
         self._end = threading.Event()
-        self._thread = threading.Thread(target=route, args=(self.endpoint, self._end.wait))
+        self._thread = threading.Thread(target=route, args=([self.endpoint], self._end.wait))
         self._thread.start()
 
     def stop(self) -> None:
@@ -117,6 +118,19 @@ class Heard(list[Any]):
         return self.until(lambda heard: len(heard) >= number)
 
 
+def cached(bus: Bus, key_expr: str = "**") -> list[RawSample]:
+    """What publishers still cache."""
+    done = Heard()
+    bus.cached(key_expr, done, WAIT_S)
+    return done.count(1)[0]
+
+
+@pytest.fixture(name="cached")
+def cached_fixture() -> Callable[..., list[RawSample]]:
+    """Asks a bus for what publishers still cache."""
+    return cached
+
+
 @pytest.fixture
 def listen() -> Callable[[], Heard]:
     """Makes collectors: `heard = listen()` is a callback that one can wait on."""
@@ -162,6 +176,11 @@ def _shaped(draw: st.DrawFn, dtype: Any, columns: int | str | None) -> Array:
     return Array.of(np.resize(np.array(values), shape), dtype)
 
 
+def _text(metas: list[msgspec.Meta]) -> st.SearchStrategy[str]:
+    patterns = [re.compile(meta.pattern) for meta in metas if meta.pattern]
+    return st.text(max_size=6).filter(lambda text: all(one.search(text) for one in patterns))
+
+
 def _of(annotation: Any, metas: list[msgspec.Meta] | None = None) -> st.SearchStrategy[Any]:
     """Strategy for a field's annotation; fails on a kind of field that it does not know."""
     origin, arguments = get_origin(annotation), get_args(annotation)
@@ -198,7 +217,7 @@ def _of(annotation: Any, metas: list[msgspec.Meta] | None = None) -> st.SearchSt
     simple: dict[Any, st.SearchStrategy[Any]] = {
         type(None): st.none(),
         bool: st.booleans(),
-        str: st.text(max_size=6),
+        str: _text(metas or []),
         bytes: st.binary(max_size=8),
     }
     return simple[annotation] if annotation in simple else _number(annotation, metas or [])

@@ -5,18 +5,19 @@ from typing import Any
 
 import pytest
 
-from fras_common.bus import Bus
+from fras_common.bus import Bus, RawSample
 from fras_common.bus.zenoh_bus import ZenohBus
 from fras_common.codec import decode
-from fras_common.messages import LogRecord, RecorderStatus, ServoJaw
-from fras_common.topics import CRTK, LOG, RECORDER_STATUS, TOPICS, Qos, Topic
+from fras_common.messages import Holds, LogRecord, ServoJaw
+from fras_common.topics import CRTK, HOLDS, LOG, TOPICS, Qos, Topic
 
 # Fixtures of conftest.py, whose classes can't be imported from here.
 Open = Callable[..., Bus]
+Cached = Callable[..., list[RawSample]]
 Listen = Callable[[], Any]
 
 JAW = CRTK[0].jaw_servo_jp
-SIM_LOG = LOG.of(service="sim")
+MOTION_LOG = LOG.of(service="motion")
 FIRST_NEW = 100.0
 
 
@@ -28,8 +29,8 @@ def record(event: str) -> LogRecord:
     return LogRecord(level="warning", event=event, fields={})
 
 
-def status(messages: int) -> RecorderStatus:
-    return RecorderStatus(state="recording", path="", messages=messages, bytes=0, lost=0, reason="")
+def held_by(holder: str) -> Holds:
+    return Holds(holds={holder: "test"})
 
 
 def put_until_heard(put: Callable[[], object], heard: Any) -> None:
@@ -63,23 +64,25 @@ def test_who_listens_gets_every_command_in_order(open_bus: Open, listen: Listen)
     assert [m.seq for m in got] == list(range(got[0].seq, got[0].seq + len(got)))
 
 
-def test_who_comes_later_gets_no_earlier_command(open_bus: Open, listen: Listen):
+def test_who_comes_later_gets_no_earlier_command(open_bus: Open, listen: Listen, cached: Cached):
     present, late, raw = listen(), listen(), listen()
     open_bus("arms/1").subscribe(JAW, present)
     sender = open_bus("motion/1")
-    publisher, latched = sender.publisher(JAW), sender.publisher(RECORDER_STATUS)
-    kept = sender.publisher(SIM_LOG)
+    publisher, latched = sender.publisher(JAW), sender.publisher(HOLDS)
+    kept = sender.publisher(MOTION_LOG)
     put_until_heard(lambda: publisher.put(jaw(1.0)), present)
     # What the same participant says on other keys is kept for later, as ever.
-    latched.put(status(7))
+    latched.put(held_by("seven"))
     kept.put(record("kept"))
 
     arms, recorder, states = open_bus("arms/2"), open_bus("recorder/1"), listen()
     arms.subscribe(JAW, late)
-    arms.subscribe(RECORDER_STATUS, states)
+    arms.subscribe(HOLDS, states)
     recorder.subscribe_raw("**", raw)
-    assert states.count(1)[0].messages == 7
-    raw.until(lambda got: {SIM_LOG.key, RECORDER_STATUS.key} <= {sample.key for sample in got})
+    kept_keys = {sample.key for sample in cached(recorder)}
+    assert {MOTION_LOG.key, HOLDS.key} <= kept_keys
+    assert JAW.key not in kept_keys
+    assert states.count(1)[0].holds == {"seven": "test"}
     put_until_heard(lambda: publisher.put(jaw(FIRST_NEW)), late)
     assert {message.jaw_rad for message in late} == {FIRST_NEW}
     put_until_heard(lambda: publisher.put(jaw(FIRST_NEW)), raw)
@@ -108,8 +111,8 @@ def test_what_was_told_while_the_router_was_away_moves_nothing_later(
     buses = [sending, hearing]
     try:
         hearing.subscribe(JAW, heard)
-        hearing.subscribe(SIM_LOG, kept)
-        publisher, log = sending.publisher(JAW), sending.publisher(SIM_LOG)
+        hearing.subscribe(MOTION_LOG, kept)
+        publisher, log = sending.publisher(JAW), sending.publisher(MOTION_LOG)
         put_until_heard(lambda: publisher.put(jaw(-1.0)), heard)
         put_until_heard(lambda: log.put(record("warm-up")), kept)
         own_router.stop()

@@ -1,18 +1,21 @@
 """Bytes as they are: what a log is replayed with; and who is there, asked once."""
 
+from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
 import pytest
 
-from fras_common.bus import Bus, NoAnswer
+from fras_common.bus import Bus, NoAnswer, RawSample
 from fras_common.bus.zenoh_bus import ZenohBus
 from fras_common.codec import encode
+from fras_common.keeping import kept_of
 from fras_common.messages import RecorderStatus
 from fras_common.topics import RECORDER_STATUS, Qos
 
 # Fixtures of conftest.py, whose classes can't be imported from here.
 Open = Callable[..., Bus]
+Cached = Callable[..., list[RawSample]]
 Listen = Callable[[], Any]
 
 ANY = "patient/tissue_state"
@@ -57,36 +60,92 @@ def test_a_typed_subscriber_gets_the_header_of_who_sent_it_first(open_bus: Open,
 
 
 @pytest.mark.parametrize("qos", Qos)
-def test_who_comes_later_gets_what_the_class_keeps(open_bus: Open, listen: Listen, qos: Qos):
-    late = listen()
+def test_who_comes_later_gets_what_the_class_keeps(open_bus: Open, cached: Cached, qos: Qos):
     bus = open_bus("replay/1")
-    publisher, mark = bus.publisher_raw(ANY, qos), bus.publisher_raw(MARK, Qos.STATE)
-    publisher.put(b"before", PACKED)
-    mark.put(b"", PACKED)
+    bus.publisher_raw(ANY, qos).put(b"before", PACKED)
+    bus.publisher_raw(MARK, Qos.STATE).put(b"", PACKED)
     bus.tokens(5.0)
-    open_bus("recorder/1").subscribe_raw("**", late)
-    late.until(lambda got: any(sample.key == MARK for sample in got))
-    kept = qos in (Qos.STATE, Qos.EVENT)
-    if kept:
-        late.until(lambda got: any(sample.key == ANY for sample in got))
-    assert any(sample.key == ANY for sample in late) == kept
+    found = cached(open_bus("recorder/1"))
+    assert any(sample.key == MARK for sample in found)
+    assert any(sample.key == ANY for sample in found) == (qos in (Qos.STATE, Qos.EVENT))
 
 
-def test_a_closed_one_forgets_what_it_kept(open_bus: Open, listen: Listen):
-    late = listen()
-    bus = open_bus("replay/1")
-    publisher, mark = bus.publisher_raw(ANY, Qos.EVENT), bus.publisher_raw(MARK, Qos.STATE)
+def test_a_closed_one_forgets_what_it_kept(open_bus: Open, cached: Cached):
+    bus, late = open_bus("replay/1"), open_bus("cli/1")
+    publisher = bus.publisher_raw(ANY, Qos.EVENT)
     publisher.put(b"of the future", PACKED)
-    mark.put(b"", PACKED)
     publisher.close()
     publisher.close()
     again = bus.publisher_raw(ANY, Qos.EVENT)
     bus.tokens(5.0)
-    open_bus("cli/1").subscribe_raw("**", late)
-    late.until(lambda got: any(sample.key == MARK for sample in got))
+    assert cached(late) == []
     again.put(b"new", PACKED)
-    late.until(lambda got: any(sample.key == ANY for sample in got))
-    assert [sample.payload for sample in late if sample.key == ANY] == [b"new"]
+    bus.tokens(5.0)
+    assert [sample.payload for sample in cached(late)] == [b"new"]
+
+
+def test_of_many_publishers_all_that_is_cached_is_told_in_their_order(
+    open_bus: Open, cached: Cached
+):
+    buses = [open_bus(f"sim/{number}") for number in range(2)]
+    keys = [f"some/key{number}" for number in range(12)]
+    publishers = [(key, bus.publisher_raw(key, Qos.STATE)) for key in keys for bus in buses]
+    for number in range(100):
+        for _, publisher in publishers:
+            publisher.put(bytes([number]) * 500, PACKED)
+    for bus in buses:
+        bus.tokens(5.0)
+    late = open_bus("recorder/1")
+    found = cached(late)
+    assert len(found) == 12 * 2 * 100
+    for key in keys:
+        got = [sample.payload[0] for sample in found if sample.key == key]
+        # Each publisher's in their order, whatever stands between.
+        first = [got.index(number) for number in range(100)]
+        assert first == sorted(first)
+        assert Counter(got) == dict.fromkeys(range(100), 2)
+    assert {sample.key for sample in cached(late, "some/key3")} == {"some/key3"}
+
+
+def test_a_cache_larger_than_one_answer_comes_whole_and_in_order(open_bus: Open, cached: Cached):
+    bus = open_bus("sim/1")
+    large, small = (bus.publisher_raw(key, Qos.STATE) for key in ("sim/tissue_state", "sa/verdict"))
+    kept = kept_of("sim/tissue_state")
+    for number in range(kept + 200):
+        large.put(number.to_bytes(4, "big") * 2_000, PACKED)
+        small.put(number.to_bytes(4, "big"), PACKED)
+    bus.tokens(5.0)
+    found = cached(open_bus("recorder/1"))
+    for key in ("sim/tissue_state", "sa/verdict"):
+        numbers = [int.from_bytes(s.payload[:4], "big") for s in found if s.key == key]
+        assert numbers == list(range(200, kept + 200)), key
+
+
+def test_who_begins_to_listen_in_mid_stream_misses_nothing_from_then_on(
+    open_bus: Open, listen: Listen, cached: Cached
+):
+    bus = open_bus("sim/1")
+    publishers = [bus.publisher_raw(f"some/key{number}", Qos.STATE) for number in range(12)]
+
+    def put(number: int) -> None:
+        for publisher in publishers:
+            publisher.put(bytes([number]), PACKED)
+
+    for number in range(100):
+        put(number)
+    heard, late = listen(), open_bus("recorder/1")
+    late.subscribe_raw("some/**", heard)
+    for number in range(100, 130):
+        put(number)
+    past = cached(late, "some/**")
+    for number in range(130, 160):
+        put(number)
+    last = 12 * 30
+    heard.until(lambda got: len([s for s in got if s.payload[0] >= 130]) >= last)
+    for number in range(12):
+        key = f"some/key{number}"
+        told = [s.payload[0] for s in [*past, *heard] if s.key == key]
+        assert sorted(set(told)) == list(range(160)), key
 
 
 def test_who_is_there_is_told_at_once_and_whole(open_bus: Open):

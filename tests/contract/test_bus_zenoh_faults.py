@@ -11,10 +11,11 @@ from typing import Any
 
 import pytest
 
-from fras_common.bus import BusClosed
+from fras_common.bus import BusClosed, Call, RemoteFault
 from fras_common.bus.zenoh_bus import NoRouter, ZenohBus, route
-from fras_common.messages import LogRecord, RecorderStatus
-from fras_common.topics import LOG, RECORDER_STATUS
+from fras_common.errors import FrasError
+from fras_common.messages import LogRecord, RecorderStatus, RestartReply, RestartRequest
+from fras_common.topics import LOG, RECORDER_STATUS, SUPERVISOR_RESTART
 
 Listen = Callable[[], Any]
 
@@ -183,9 +184,49 @@ def test_an_impossible_endpoint_is_no_router(endpoint: str):
     with pytest.raises(NoRouter):
         ZenohBus("one", endpoint, "sim/1", open_timeout_s=0.2)
     with pytest.raises(NoRouter):
-        route(endpoint, until=lambda: None)
+        route([endpoint], until=lambda: None)
 
 
 def test_a_taken_port_is_named(router: Any):
+    ZenohBus("one", router.endpoint, "cli/1").close()  # it listens
     with pytest.raises(NoRouter, match="cannot listen on"):
-        route(router.endpoint, until=lambda: None)
+        route([router.endpoint], until=lambda: None)
+
+
+class NotHere(FrasError):
+    """Another host's supervisor keeps it."""
+
+
+@pytest.fixture
+def open_zenoh(router: Any) -> Iterator[Callable[[str], ZenohBus]]:
+    cell, opened = f"servers-{uuid.uuid4().hex[:6]}", list[ZenohBus]()
+
+    def open_one(source: str) -> ZenohBus:
+        opened.append(ZenohBus(cell, router.endpoint, source))
+        return opened[-1]
+
+    yield open_one
+    for one in opened:
+        one.close()
+
+
+def test_of_two_servers_the_one_that_does_it_counts(open_zenoh: Callable[[str], ZenohBus]):
+    """As where each of two hosts has a supervisor: whoever refuses keeps nobody from doing it."""
+
+    def refuse(call: Call[RestartRequest, RestartReply]) -> None:
+        call.fail(NotHere(call.request.name))
+
+    def do(call: Call[RestartRequest, RestartReply]) -> None:
+        if call.request.name == "sim":
+            call.reply(RestartReply(name="sim", state="ready", restarts=1))
+        else:
+            refuse(call)
+
+    for number, serve in enumerate((refuse, do, refuse)):
+        open_zenoh(f"supervisor/{number}").serve(SUPERVISOR_RESTART, serve)
+    client = open_zenoh("cli/1")
+    for _ in range(20):
+        asked = RestartRequest(name="sim", by="test")
+        assert client.query(SUPERVISOR_RESTART, asked, 10.0).restarts == 1
+    with pytest.raises(RemoteFault, match="NotHere"):
+        client.query(SUPERVISOR_RESTART, RestartRequest(name="sun", by="test"), 10.0)

@@ -59,7 +59,7 @@ def test_each_query_key_stands_once():
 
 @each_topic
 def test_the_producer_is_a_known_service(topic: Topic[Any]):
-    assert topic.producer in {*SERVICES, "*", "arms", "client"}
+    assert topic.producer in {*SERVICES, *TOOLS, "*", "arms", "client"}
     assert (topic.producer == "*") == ("{" in topic.key)
 
 

@@ -3,6 +3,7 @@
 import functools
 import hashlib
 import re
+import threading
 from collections.abc import Callable
 from typing import Annotated, Any, TypeVar
 
@@ -31,22 +32,28 @@ def encode(message: object) -> bytes:
     return _encoder.encode(message)
 
 
+_making = threading.Lock()
+
+
 @functools.cache
 def _decoder(kind: type[Any]) -> Callable[[bytes], Any]:
-    return msgspec.msgpack.Decoder(kind).decode
+    # Two threads that make decoders of types with a part in common end the process: the library
+    # shows the one what the other has half made.
+    with _making:
+        return msgspec.msgpack.Decoder(kind).decode
 
 
-def decode(kind: type[T], payload: bytes, key: str) -> T:
-    """Decode and validate `payload`, received on `key`.
+def decode(kind: type[T], payload: bytes, key: str, most_bytes: int = MAX_MESSAGE_BYTES) -> T:
+    """Decode and validate `payload`, received on `key`, of at most `most_bytes`.
 
     Raises
     ------
     MalformedMessage
         With the path of the field that is wrong (`$.seq`) and what was expected.
     """
-    if len(payload) > MAX_MESSAGE_BYTES:
+    if len(payload) > most_bytes:
         raise MalformedMessage(
-            key, "$", f"{len(payload)} bytes, more than the {MAX_MESSAGE_BYTES} allowed"
+            key, "$", f"{len(payload)} bytes, more than the {most_bytes} allowed"
         )
     try:
         return _decoder(kind)(payload)

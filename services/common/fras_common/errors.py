@@ -1,5 +1,7 @@
 """The one tree of errors: each carries its values as attributes, its text says what to do."""
 
+SHOWN_LENGTH = 2_000
+
 
 class FrasError(Exception):
     """Base of every error that FRAS raises on purpose.
@@ -26,3 +28,12 @@ class FrasError(Exception):
     def kind(self) -> str:
         """Name that travels with the error over the bus."""
         return type(self).__name__
+
+
+def shown(value: object) -> str:
+    """Return a value as an error's text shows it, however long or deep it is."""
+    try:
+        text = repr(value)
+    except RecursionError:
+        return "something nested too deeply to be shown"
+    return text if len(text) <= SHOWN_LENGTH else f"{text[:SHOWN_LENGTH]}..."

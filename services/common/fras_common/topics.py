@@ -4,15 +4,32 @@ Publishers, subscribers, recorder, documentation and contract tests are all gene
 A key may hold one placeholder, `{name}`, for a family of keys (`health/{service}`).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Any, Generic, TypeVar
+from typing import Any, Final, Generic, TypeVar
 
 from fras_common import messages as m
+from fras_common.codec import MAX_MESSAGE_BYTES
 
 M = TypeVar("M", bound=m.Header)
 Req = TypeVar("Req")
 Rep = TypeVar("Rep")
+
+SMALL: Final = 64 * 2**10
+"""Commands and questions [bytes]: names, a few numbers, a sentence."""
+USUAL: Final = 2**20
+"""What says how things stand [bytes]."""
+WORDY: Final = 16 * 2**20
+"""Contexts and plans [bytes]: thousands of atoms, at the finest grid of blocks."""
+BULK: Final = MAX_MESSAGE_BYTES
+"""What carries a mesh, or other messages [bytes]."""
+
+KEPT: Final = 1000
+"""Messages of a key: five seconds of ticks as fast as possible, or hundreds of a trial's events."""
+SOME: Final = 100
+"""Of what is larger and comes less often."""
+FEW: Final = 16
+"""Of what carries a mesh or other messages, and comes a few times in a trial."""
 
 
 class Qos(StrEnum):
@@ -42,6 +59,10 @@ class Topic(Generic[M]):
         A service; `*`: each of them; `arms`: whoever drives the robot; `client`: anyone.
     in_trial : bool
         Belongs to a trial: a service drops and counts it outside the trial of its last reset.
+    max_bytes : int
+        A longer payload is malformed, whatever it says.
+    kept : int
+        How many the publisher keeps for who lost them or comes late, and the recorder remembers.
     """
 
     key: str
@@ -50,12 +71,12 @@ class Topic(Generic[M]):
     qos: Qos
     when: str
     in_trial: bool = True
+    max_bytes: int = USUAL
+    kept: int = KEPT
 
     def of(self, **names: str) -> "Topic[M]":
         """Fill the placeholder: `HEALTH.of(service="sim")`."""
-        return Topic(
-            self.key.format(**names), self.type, self.producer, self.qos, self.when, self.in_trial
-        )
+        return replace(self, key=self.key.format(**names))
 
     @property
     def wildcard(self) -> str:
@@ -66,12 +87,25 @@ class Topic(Generic[M]):
 
 @dataclass(frozen=True)
 class Query(Generic[Req, Rep]):
-    """One question that one service answers; mirrored on `rpc/<server>/<name>`."""
+    """One question that one service answers; mirrored on `rpc/<server>/<name>`.
+
+    Attributes
+    ----------
+    askers : tuple of str
+        Whose certificates may ask it under the security profile; `*`: each. Nobody by default.
+    max_bytes : int
+        A longer request is malformed.
+    kept : int
+        How many mirrors the publisher keeps, and the recorder remembers.
+    """
 
     key: str
     request: type[Req]
     reply: type[Rep]
     server: str
+    askers: tuple[str, ...] = ()
+    max_bytes: int = SMALL
+    kept: int = KEPT
 
     @property
     def mirror(self) -> str:
@@ -79,13 +113,19 @@ class Query(Generic[Req, Rep]):
         return f"rpc/{self.server}/{self.key.partition('/')[2]}"
 
 
-TISSUE_MODEL = Topic("sim/tissue_model", m.TissueModel, "sim", Qos.EVENT, "each reset")
-TISSUE_STATE = Topic("sim/tissue_state", m.TissueState, "sim", Qos.STATE, "each tick")
-SIM_CHECKPOINT = Topic("sim/checkpoint", m.SimCheckpoint, "sim", Qos.STATE, "every 10 ticks")
+TISSUE_MODEL = Topic(
+    "sim/tissue_model", m.TissueModel, "sim", Qos.EVENT, "each reset", max_bytes=BULK, kept=FEW
+)
+TISSUE_STATE = Topic(
+    "sim/tissue_state", m.TissueState, "sim", Qos.STATE, "each tick", max_bytes=BULK
+)
+SIM_CHECKPOINT = Topic(
+    "sim/checkpoint", m.SimCheckpoint, "sim", Qos.STATE, "every 10 ticks", max_bytes=BULK, kept=SOME
+)
 ROBOT_STATE = Topic("robot/state", m.RobotState, "motion", Qos.STATE, "each tick")
 VERDICT = Topic("sa/verdict", m.Verdict, "sa", Qos.STATE, "each tick")
-CONTEXT = Topic("sa/context", m.Context, "sa", Qos.EVENT, "on request")
-PLAN = Topic("planner/plan", m.Plan, "planner", Qos.EVENT, "each plan")
+CONTEXT = Topic("sa/context", m.Context, "sa", Qos.EVENT, "on request", max_bytes=WORDY, kept=SOME)
+PLAN = Topic("planner/plan", m.Plan, "planner", Qos.EVENT, "each plan", max_bytes=WORDY, kept=SOME)
 TASK_STATUS = Topic(
     "planner/task_status", m.TaskStatus, "planner", Qos.EVENT, "each change", in_trial=False
 )
@@ -99,12 +139,31 @@ RECORDER_STATUS = Topic(
 RECORDER_EVENT = Topic(
     "recorder/event", m.RecorderEvent, "recorder", Qos.STATE, "each", in_trial=False
 )
+SUPERVISOR_STATUS = Topic(
+    "supervisor/status",
+    m.SupervisorStatus,
+    "supervisor",
+    Qos.TELEMETRY,
+    "each change, 1 Hz",
+    in_trial=False,
+)
+PRESENCE = Topic(
+    "monitor/presence", m.Presence, "monitor", Qos.TELEMETRY, "each change, 4 Hz", in_trial=False
+)
 HEALTH = Topic("health/{service}", m.Health, "*", Qos.TELEMETRY, "2 Hz", in_trial=False)
 LOG = Topic("log/{service}", m.LogRecord, "*", Qos.STATE, "from WARNING up", in_trial=False)
 FAULT = Topic(
     "fault/{service}", m.FaultRecord, "*", Qos.STATE, "each refused message", in_trial=False
 )
-RPC = Topic("rpc/{service}/{name}", m.RpcRecord, "*", Qos.STATE, "each query", in_trial=False)
+RPC = Topic(
+    "rpc/{service}/{name}",
+    m.RpcRecord,
+    "*",
+    Qos.STATE,
+    "each query",
+    in_trial=False,
+    max_bytes=BULK,
+)
 
 ARMS: tuple[str, ...] = ("psm1", "psm2")
 
@@ -212,7 +271,9 @@ class ArmTopics:
 
     def _told(self, name: str, kind: type[M]) -> Topic[M]:
         key = f"{self.arm}/{name}"
-        return Topic(key, kind, "client", Qos.COMMAND, "on request", in_trial=False)
+        return Topic(
+            key, kind, "client", Qos.COMMAND, "on request", in_trial=False, max_bytes=SMALL
+        )
 
 
 CRTK: tuple[ArmTopics, ...] = tuple(ArmTopics(arm) for arm in ARMS)
@@ -230,6 +291,8 @@ TOPICS: tuple[Topic[Any], ...] = (
     HOLDS,
     RECORDER_STATUS,
     RECORDER_EVENT,
+    SUPERVISOR_STATUS,
+    PRESENCE,
     HEALTH,
     LOG,
     FAULT,
@@ -237,26 +300,56 @@ TOPICS: tuple[Topic[Any], ...] = (
     *(topic for arm in CRTK for topic in arm.all),
 )
 
-TASK = Query("planner/task", m.TaskRequest, m.TaskReply, "planner")
-WHY_NOT = Query("planner/why_not", m.WhyNotRequest, m.WhyNotReply, "planner")
-EXECUTE = Query("motion/execute", m.ExecuteRequest, m.ExecuteReply, "motion")
-CANCEL = Query("motion/cancel", m.CancelRequest, m.CancelReply, "motion")
-HOLD = Query("motion/hold", m.HoldRequest, m.HoldState, "motion")
-RESUME = Query("motion/resume", m.ResumeRequest, m.HoldState, "motion")
-MOTION_RESET = Query("motion/reset", m.ResetRequest, m.ResetReply, "motion")
-SIM_RESET = Query("sim/reset", m.ResetRequest, m.ResetReply, "sim")
-SA_RESET = Query("sa/reset", m.ResetRequest, m.ResetReply, "sa")
-SA_CONTEXT = Query("sa/context", m.ContextRequest, m.Context, "sa")
-SA_TARGET = Query("sa/target", m.TargetRequest, m.TargetReply, "sa")
-RECORDER_OPEN = Query("recorder/open", m.OpenRequest, m.ResetReply, "recorder")
-RECORDER_CLOSE = Query("recorder/close", m.CloseRequest, m.CloseReply, "recorder")
-RECORDER_LAST = Query("recorder/last", m.LastRequest, m.LastReply, "recorder")
-REPLAY_CONTROL = Query("replay/control", m.ReplayControl, m.ReplayStatus, "replay")
-REPLAY_STATUS = Query("replay/status", m.ReplayStatusRequest, m.ReplayStatus, "replay")
+ANYONE: tuple[str, ...] = ("*",)
+PEOPLE: tuple[str, ...] = ("cli", "monitor")
+"""Where a person stands behind the question."""
+EXECUTIVE: tuple[str, ...] = ("planner",)
+
+# A stop from anybody is safe; what lifts one or begins a motion is not.
+TASK = Query(
+    "planner/task",
+    m.TaskRequest,
+    m.TaskReply,
+    "planner",
+    (*PEOPLE, "supervisor"),
+    max_bytes=BULK,
+    kept=FEW,
+)
+WHY_NOT = Query("planner/why_not", m.WhyNotRequest, m.WhyNotReply, "planner", ANYONE)
+APPROVE = Query("planner/approve", m.ApproveRequest, m.DecisionReply, "planner", PEOPLE)
+REJECT = Query("planner/reject", m.RejectRequest, m.DecisionReply, "planner", PEOPLE)
+EXECUTE = Query("motion/execute", m.ExecuteRequest, m.ExecuteReply, "motion", EXECUTIVE)
+CANCEL = Query("motion/cancel", m.CancelRequest, m.CancelReply, "motion", (*PEOPLE, *EXECUTIVE))
+HOLD = Query("motion/hold", m.HoldRequest, m.HoldState, "motion", ANYONE)
+RESUME = Query("motion/resume", m.ResumeRequest, m.HoldState, "motion", (*PEOPLE, *EXECUTIVE))
+MOTION_RESET = Query(
+    "motion/reset", m.ResetRequest, m.ResetReply, "motion", EXECUTIVE, max_bytes=BULK, kept=FEW
+)
+SIM_RESET = Query(
+    "sim/reset", m.ResetRequest, m.ResetReply, "sim", EXECUTIVE, max_bytes=BULK, kept=FEW
+)
+SA_RESET = Query(
+    "sa/reset", m.ResetRequest, m.ResetReply, "sa", EXECUTIVE, max_bytes=BULK, kept=FEW
+)
+SA_CONTEXT = Query("sa/context", m.ContextRequest, m.Context, "sa", EXECUTIVE, kept=SOME)
+SA_TARGET = Query("sa/target", m.TargetRequest, m.TargetReply, "sa", EXECUTIVE)
+RECORDER_OPEN = Query(
+    "recorder/open", m.OpenRequest, m.ResetReply, "recorder", EXECUTIVE, max_bytes=BULK, kept=FEW
+)
+RECORDER_CLOSE = Query("recorder/close", m.CloseRequest, m.CloseReply, "recorder", EXECUTIVE)
+RECORDER_LAST = Query("recorder/last", m.LastRequest, m.LastReply, "recorder", ANYONE, kept=FEW)
+RECORDER_SINCE = Query("recorder/since", m.SinceRequest, m.SinceReply, "recorder", ANYONE, kept=FEW)
+REPLAY_CONTROL = Query("replay/control", m.ReplayControl, m.ReplayStatus, "replay", PEOPLE)
+REPLAY_STATUS = Query("replay/status", m.ReplayStatusRequest, m.ReplayStatus, "replay", ANYONE)
+SUPERVISOR_RESTART = Query(
+    "supervisor/restart", m.RestartRequest, m.RestartReply, "supervisor", PEOPLE
+)
 
 QUERIES: tuple[Query[Any, Any], ...] = (
     TASK,
     WHY_NOT,
+    APPROVE,
+    REJECT,
     EXECUTE,
     CANCEL,
     HOLD,
@@ -269,13 +362,15 @@ QUERIES: tuple[Query[Any, Any], ...] = (
     RECORDER_OPEN,
     RECORDER_CLOSE,
     RECORDER_LAST,
+    RECORDER_SINCE,
     REPLAY_CONTROL,
     REPLAY_STATUS,
+    SUPERVISOR_RESTART,
 )
 
 SERVICES: tuple[str, ...] = ("sim", "sa", "planner", "motion", "recorder")
-TOOLS: tuple[str, ...] = ("replay",)
-"""Processes that serve queries, too, but belong to no stack."""
+TOOLS: tuple[str, ...] = ("replay", "supervisor", "monitor")
+"""Who publishes and serves queries, too, but is no part of a stack: none waits for them."""
 
 
 def topic_of(key: str) -> Topic[Any] | None:
@@ -283,6 +378,12 @@ def topic_of(key: str) -> Topic[Any] | None:
     if (topic := _CONCRETE.get(key)) is not None:
         return topic
     return next((family for head, family in _FAMILIES if key.startswith(head)), None)
+
+
+def may_be_lost(key: str) -> bool:
+    """Whether a message that never arrives is not missed: on this key the next replaces it."""
+    topic = topic_of(key)
+    return topic is not None and topic.qos is Qos.TELEMETRY
 
 
 _CONCRETE = {topic.key: topic for topic in TOPICS if "{" not in topic.key}

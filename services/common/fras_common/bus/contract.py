@@ -3,7 +3,8 @@
 - Order holds within a key, not across keys: join by tick.
 - Callbacks run on threads of the bus; they must only append to an inbox.
 - A put never blocks for a slow or frozen subscriber.
-- A payload that does not fit its key reaches the `on_malformed` of the bus, never a callback.
+- A payload that does not fit its key, or is not of whom the topic table says, reaches the
+  `on_malformed` of the bus, never a callback; samples received raw are as they came.
 - After `close` nothing is delivered and every call raises `BusClosed`; a question still open ends
   with `NoAnswer`.
 - A publisher may be used from several threads: samples travel in the order of their `seq`.
@@ -116,7 +117,13 @@ class Bus(Protocol):
         ...
 
     def subscribe_raw(self, key_expr: str, callback: Callable[[RawSample], None]) -> None:
-        """Receive samples undecoded, with what the publishers still cache."""
+        """Receive samples undecoded, from now on; `cached` gives what came before."""
+        ...
+
+    def cached(
+        self, key_expr: str, on_done: Callable[[list[RawSample]], None], timeout_s: float
+    ) -> None:
+        """Ask without waiting for all that publishers still cache; each one's come in order."""
         ...
 
     def serve(self, query: Query[Req, Rep], callback: Callable[[Call[Req, Rep]], None]) -> None:
@@ -130,7 +137,10 @@ class Bus(Protocol):
         on_done: Callable[[Rep | FrasError], None],
         timeout_s: float,
     ) -> None:
-        """Ask without waiting; `on_done` gets the reply, `RemoteFault`, `NoAnswer` or malformed."""
+        """Ask without waiting; `on_done` gets the reply, `RemoteFault`, `NoAnswer` or malformed.
+
+        Of several servers the first reply counts, and an error only if none replies.
+        """
         ...
 
     def query(self, query: Query[Req, Rep], request: Req, timeout_s: float) -> Rep:

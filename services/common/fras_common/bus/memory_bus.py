@@ -12,17 +12,16 @@ from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 from fras_common.bus.contract import BusClosed, Call, OnMalformed, RawSample, RemoteFault
-from fras_common.bus.shared import Answer, Stamper, wait_for
+from fras_common.bus.shared import Answer, Stamper, received, wait_for
 from fras_common.codec import MalformedMessage, decode, encode
 from fras_common.errors import FrasError
+from fras_common.keeping import kept_of
 from fras_common.messages import Fault, Header
 from fras_common.topics import Qos, Query, Topic
 
 M = TypeVar("M", bound=Header)
 Req = TypeVar("Req")
 Rep = TypeVar("Rep")
-
-CACHE = 1000
 
 
 @dataclass(frozen=True)
@@ -103,7 +102,7 @@ class MemoryBus:
 
         def deliver(sample: RawSample) -> None:
             try:
-                message = decode(topic.type, sample.payload, sample.key)
+                message = received(topic, sample.payload, sample.key)
             except MalformedMessage as error:
                 self._on_malformed(error)
             else:
@@ -112,8 +111,8 @@ class MemoryBus:
         self._subscribe(topic.wildcard, deliver, history=1 if topic.qos is Qos.EVENT else 0)
 
     def subscribe_raw(self, key_expr: str, callback: Callable[[RawSample], None]) -> None:
-        """Receive samples undecoded, with what the publishers still cache."""
-        self._subscribe(key_expr, callback, history=CACHE)
+        """Receive samples undecoded, from now on."""
+        self._subscribe(key_expr, callback, history=0)
 
     def _subscribe(self, key_expr: str, deliver: Callable[[RawSample], None], history: int) -> None:
         self._require_open()
@@ -125,13 +124,24 @@ class MemoryBus:
                         for sample in list(cache)[-history:]:
                             deliver(sample)
 
+    def cached(
+        self, key_expr: str, on_done: Callable[[list[RawSample]], None], timeout_s: float
+    ) -> None:
+        """Ask without waiting for all that publishers still cache; each one's come in order."""
+        del timeout_s
+        self._require_open()
+        with self._fabric.lock:
+            caches = self._fabric.caches[self._cell].items()
+            samples = [one for (_, key), cache in caches if matches(key_expr, key) for one in cache]
+        on_done(samples)
+
     def serve(self, query: Query[Req, Rep], callback: Callable[[Call[Req, Rep]], None]) -> None:
         """Answer a query."""
         self._require_open()
 
         def receive(payload: bytes, give_back: _Return) -> None:
             try:
-                request = decode(query.request, payload, query.key)
+                request = decode(query.request, payload, query.key, query.max_bytes)
             except MalformedMessage as error:
                 self._on_malformed(error)
                 give_back(Fault(kind=error.kind, text=str(error)))
@@ -253,7 +263,7 @@ class MemoryBus:
             if qos in (Qos.STATE, Qos.EVENT):
                 slot = (id(self), sample.key)
                 caches = self._fabric.caches[self._cell]
-                caches.setdefault(slot, deque(maxlen=CACHE)).append(sample)
+                caches.setdefault(slot, deque(maxlen=kept_of(sample.key))).append(sample)
             for subscription in list(self._fabric.subscriptions[self._cell]):
                 if matches(subscription.key_expr, sample.key):
                     subscription.deliver(sample)

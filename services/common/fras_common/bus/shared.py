@@ -1,4 +1,4 @@
-"""What every implementation of the bus does alike: stamping, and turning outcomes into errors."""
+"""What every implementation of the bus does alike: stamping, checking, outcomes into errors."""
 
 import itertools
 import threading
@@ -8,9 +8,11 @@ from typing import Any, Generic, TypeVar
 import msgspec
 
 from fras_common.bus.contract import NoAnswer
+from fras_common.codec import decode
 from fras_common.errors import FrasError
 from fras_common.messages import Header
-from fras_common.topics import Query
+from fras_common.provenance import require_source
+from fras_common.topics import Query, Topic
 
 M = TypeVar("M", bound=Header)
 T = TypeVar("T")
@@ -38,6 +40,19 @@ class Stamper:
         return msgspec.structs.replace(
             message, stamp_ns=self._clock_ns(), seq=next(self._count), source=self._source
         )
+
+
+def received(topic: Topic[M], payload: bytes, key: str) -> M:
+    """Decode what came in on a key of `topic`, if its source may speak there.
+
+    Raises
+    ------
+    MalformedMessage
+        It is not what its key promises; `WrongSource`: nor of whom.
+    """
+    message = decode(topic.type, payload, key, topic.max_bytes)
+    require_source(key, message.source)
+    return message
 
 
 class Answer(Generic[T]):

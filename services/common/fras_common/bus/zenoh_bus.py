@@ -11,7 +11,7 @@ put for seconds; dropping with recovery from the publisher's cache loses nothing
 import json
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Generic, TypeVar, cast
 
 import zenoh
@@ -25,9 +25,13 @@ from fras_common.bus.contract import (
     RawSample,
     RemoteFault,
 )
-from fras_common.bus.shared import Answer, Stamper, wait_for
+from fras_common.bus.past import Cached, Past
+from fras_common.bus.settings import NoRouter, Settings, client_settings, router_settings
+from fras_common.bus.shared import Answer, Stamper, received, wait_for
 from fras_common.codec import MalformedMessage, decode, encode
 from fras_common.errors import FrasError
+from fras_common.identity import Identity, require_tls
+from fras_common.keeping import kept_of
 from fras_common.messages import Fault, Header
 from fras_common.topics import Qos, Query, Topic
 
@@ -35,23 +39,13 @@ M = TypeVar("M", bound=Header)
 Req = TypeVar("Req")
 Rep = TypeVar("Rep")
 
-CACHE = 1000
 HEARTBEAT_S = 0.1
 ENCODING = zenoh.Encoding("application/msgpack")
 TOKENS = ("alive/**", "ready/**")
-
-# Zenoh's own queue of two batches and 1 ms of patience drop samples whenever its sender thread
-# waits for a processor, and a sample dropped while an earlier loss is being recovered is never
-# recovered (measured: 600 puts of 40 kB on a starved machine lost some in 5 of 10 runs; with these
-# settings in none). A link that is congested already drops at once, so nobody waits for long.
-TX_QUEUE = {
-    "transport/link/tx/queue/size/real_time": 16,
-    "transport/link/tx/queue/congestion_control/drop/wait_before_drop": 20_000,
-}
-
-
-class NoRouter(FrasError):
-    """No Zenoh router answered at the address given."""
+# What was said before gives way to what is said now, health above all.
+_REPLIES = zenoh.ext.RepliesConfig(
+    congestion_control=zenoh.CongestionControl.BLOCK, priority=zenoh.Priority.DATA_LOW
+)
 
 
 class ZenohBus:
@@ -71,11 +65,15 @@ class ZenohBus:
         Wall clock for the stamps.
     open_timeout_s : float
         How long to wait for the router.
+    identity : Identity, optional
+        What it shows to a router at a `tls/` endpoint.
 
     Raises
     ------
     NoRouter
-        If none answered in time.
+        If none answered in time, or the router does not know the identity.
+    BadIdentity
+        If the endpoint is `tls/` without an identity, or another one with it.
     """
 
     def __init__(
@@ -86,20 +84,19 @@ class ZenohBus:
         on_malformed: OnMalformed = lambda error: None,
         clock_ns: Callable[[], int] = time.time_ns,
         open_timeout_s: float = 10.0,
+        identity: Identity | None = None,
     ) -> None:
+        require_tls(connect, identity)
         self._source = source
         self._on_malformed = on_malformed
         self._clock_ns = clock_ns
         self._closed = False
         self._declared: list[Any] = []
         try:
-            self._session = zenoh.open(_client_config(cell, connect, open_timeout_s))
+            settings = client_settings(cell, connect, open_timeout_s, identity)
+            self._session = zenoh.open(_config(settings))
         except zenoh.ZError as error:
-            raise NoRouter(
-                f"no Zenoh router at {connect} within {open_timeout_s} s: start one with "
-                f"`fras up`, or name another with --connect ({error})",
-                connect=connect,
-            ) from error
+            raise NoRouter.within(open_timeout_s, connect, identity, error) from error
 
     def publisher(self, topic: Topic[M]) -> "_ZenohPublisher[M]":
         """Declare a publisher on a concrete key."""
@@ -137,7 +134,7 @@ class ZenohBus:
                 reliability=zenoh.Reliability.RELIABLE,
                 priority=zenoh.Priority.REAL_TIME,
                 express=True,
-                cache=zenoh.ext.CacheConfig(CACHE),
+                cache=zenoh.ext.CacheConfig(kept_of(key), replies_config=_REPLIES),
                 sample_miss_detection=zenoh.ext.MissDetectionConfig(
                     heartbeat=HEARTBEAT_S, sporadic_heartbeat=None
                 ),
@@ -157,7 +154,7 @@ class ZenohBus:
 
         def deliver(sample: zenoh.Sample) -> None:
             try:
-                message = decode(topic.type, sample.payload.to_bytes(), str(sample.key_expr))
+                message = received(topic, sample.payload.to_bytes(), str(sample.key_expr))
             except MalformedMessage as error:
                 self._on_malformed(error)
             else:
@@ -172,15 +169,10 @@ class ZenohBus:
         )
 
     def subscribe_raw(self, key_expr: str, callback: Callable[[RawSample], None]) -> None:
-        """Receive samples undecoded, with what the publishers still cache."""
-
-        def deliver(sample: zenoh.Sample) -> None:
-            callback(
-                RawSample(str(sample.key_expr), sample.payload.to_bytes(), str(sample.encoding))
-            )
-
-        history = zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=CACHE)
-        self._subscribe(key_expr, deliver, history=history, recover=True)
+        """Receive samples undecoded, from now on."""
+        # No history: the library drops what comes of it behind a live sample of the publisher, and
+        # with many publishers the first live one, too (measured). `cached` asks for all of it.
+        self._subscribe(key_expr, lambda one: callback(_raw(one)), history=None, recover=True)
 
     def _subscribe(
         self,
@@ -201,6 +193,40 @@ class ZenohBus:
             )
         )
 
+    def cached(
+        self, key_expr: str, on_done: Callable[[list[RawSample]], None], timeout_s: float
+    ) -> None:
+        """Ask without waiting for all that publishers still cache; each one's come in order."""
+        self.require_open()
+        Past(self._get_cached, on_done, timeout_s).ask(key_expr)
+
+    def _get_cached(
+        self,
+        selector: str,
+        note: Callable[[Cached], None],
+        on_end: Callable[[], None],
+        timeout_s: float,
+    ) -> None:
+        def on_reply(reply: zenoh.Reply) -> None:
+            if reply.ok is not None and (info := reply.ok.source_info) is not None:
+                publisher = f"{info.source_id.zid}/{info.source_id.eid}"
+                note(Cached(_raw(reply.ok), publisher, info.source_sn))
+
+        try:
+            self._session.get(
+                selector,
+                cast(Any, zenoh.handlers.Callback(on_reply, on_end)),
+                target=zenoh.QueryTarget.ALL,
+                consolidation=zenoh.ConsolidationMode.NONE,
+                accept_replies=zenoh.ReplyKeyExpr.ANY,
+                timeout=timeout_s,
+            )
+        except zenoh.ZError:
+            # Closed meanwhile: what came until then is the answer.
+            if not self._closed:
+                raise
+            on_end()
+
     def serve(self, query: Query[Req, Rep], callback: Callable[[Call[Req, Rep]], None]) -> None:
         """Answer a query."""
         self.require_open()
@@ -208,7 +234,7 @@ class ZenohBus:
         def receive(asked: zenoh.Query) -> None:
             payload = asked.payload.to_bytes() if asked.payload is not None else b""
             try:
-                request = decode(query.request, payload, query.key)
+                request = decode(query.request, payload, query.key, query.max_bytes)
             except MalformedMessage as error:
                 self._on_malformed(error)
                 _ZenohCall(asked, None).fail(error)
@@ -227,17 +253,28 @@ class ZenohBus:
         """Ask without waiting."""
         self.require_open()
         answer: Answer[Rep] = Answer(on_done)
+        refusals: list[FrasError] = []
 
         def on_reply(reply: zenoh.Reply) -> None:
-            answer.settle(_outcome(query, reply, timeout_s))
+            outcome = _outcome(query, reply, timeout_s)
+            if isinstance(outcome, FrasError):
+                refusals.append(outcome)
+            else:
+                answer.settle(outcome)
 
-        handler = zenoh.handlers.Callback(on_reply, lambda: answer.expire(query.key, timeout_s))
+        def on_end() -> None:
+            # Where each host has a supervisor all are asked, and one does it.
+            answer.settle(refusals[0] if refusals else NoAnswer(query.key, timeout_s))
+
+        handler = zenoh.handlers.Callback(on_reply, on_end)
         self._session.get(
             query.key,
             cast(Any, handler),
             payload=encode(request),
             encoding=ENCODING,
             timeout=timeout_s,
+            target=zenoh.QueryTarget.ALL,
+            consolidation=zenoh.ConsolidationMode.NONE,
             congestion_control=zenoh.CongestionControl.BLOCK,
             express=True,
         )
@@ -339,6 +376,10 @@ class _ZenohCall:
         self._asked.drop()
 
 
+def _raw(sample: zenoh.Sample) -> RawSample:
+    return RawSample(str(sample.key_expr), sample.payload.to_bytes(), str(sample.encoding))
+
+
 def _outcome(query: Query[Any, Rep], reply: zenoh.Reply, timeout_s: float) -> Rep | FrasError:
     try:
         if reply.ok is not None:
@@ -352,49 +393,42 @@ def _outcome(query: Query[Any, Rep], reply: zenoh.Reply, timeout_s: float) -> Re
         return error
 
 
-def _client_config(cell: str, connect: str, open_timeout_s: float) -> zenoh.Config:
+def _config(settings: Settings) -> zenoh.Config:
     config = zenoh.Config()
-    settings = {
-        "mode": "client",
-        "namespace": f"fras/{cell}",
-        "connect/endpoints": [connect],
-        "connect/timeout_ms": int(open_timeout_s * 1000),
-        "connect/exit_on_failure": True,
-        "scouting/multicast/enabled": False,
-        "timestamping/enabled": True,
-        # Its segments stay behind in /dev/shm; our messages are too small to gain from it.
-        "transport/shared_memory/enabled": False,
-        **TX_QUEUE,
-    }
     for key, value in settings.items():
         config.insert_json5(key, json.dumps(value))
     return config
 
 
-def route(listen: str, until: Callable[[], None]) -> None:
-    """Be a full Zenoh router on `listen` for as long as `until` blocks.
+def route(
+    listen: Sequence[str],
+    until: Callable[[], None],
+    identity: Identity | None = None,
+    access: Mapping[str, object] | None = None,
+    connect: Sequence[str] = (),
+) -> None:
+    """Be a full Zenoh router on all of `listen` for as long as `until` blocks.
+
+    The link to each router in `connect` is made as soon as that router is there, and again
+    whenever it was lost. See `router_settings`.
 
     Raises
     ------
     NoRouter
         If the address can't be bound.
+    BadIdentity
+        If the endpoint is `tls/` without an identity, or another one with it.
     """
-    config = zenoh.Config()
-    settings = {
-        "mode": "router",
-        "listen/endpoints": [listen],
-        "scouting/multicast/enabled": False,
-        "timestamping/enabled": True,
-        # Its segments stay behind in /dev/shm; our messages are too small to gain from it.
-        "transport/shared_memory/enabled": False,
-        **TX_QUEUE,
-    }
+    for endpoint in listen:
+        require_tls(endpoint, identity)
+    if identity is not None:
+        # Who is not let in is told of on standard error, and so in the router's log.
+        zenoh.init_log_from_env_or("warn")
     try:
-        for key, value in settings.items():
-            config.insert_json5(key, json.dumps(value))
-        session = zenoh.open(config)
+        session = zenoh.open(_config(router_settings(listen, identity, access, connect)))
     except zenoh.ZError as error:
-        raise NoRouter(f"cannot listen on {listen}: {error}", connect=listen) from error
+        asked = ", ".join(listen)
+        raise NoRouter(f"cannot listen on {asked}: {error}", connect=asked) from error
     try:
         until()
     finally:

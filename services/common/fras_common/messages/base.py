@@ -2,15 +2,20 @@
 
 import math
 from collections.abc import Mapping
-from typing import Literal, Self
+from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 import msgspec
-import numpy as np
-from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    # Loaded where an array is made or looked at: who only hands messages on needs none of it.
+    import numpy as np
+    from numpy.typing import NDArray
 
 Vec3 = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 DType = Literal["<f4", "<f8", "<i4", "<i8"]
+TrialName = Annotated[str, msgspec.Meta(max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$")]
+"""Of who begins a trial; it stands in each message, in logs and on screens."""
 
 MAX_ARRAY_BYTES = 64 * 1024 * 1024
 MAX_DIMENSIONS = 8
@@ -68,7 +73,7 @@ class Array(Wire, frozen=True, kw_only=True):
             )
 
     @classmethod
-    def of(cls, values: NDArray[np.generic], dtype: DType) -> Self:
+    def of(cls, values: "NDArray[np.generic]", dtype: DType) -> Self:
         """Copy `values` into a message field, converted to `dtype`.
 
         Raises
@@ -76,22 +81,26 @@ class Array(Wire, frozen=True, kw_only=True):
         ValueError
             If `dtype` is an integer type that can't hold every value exactly.
         """
+        import numpy as np
+
         array = np.asarray(values, dtype=np.dtype(dtype), order="C")
         if array.dtype.kind == "i" and not np.array_equal(array, values):
             raise ValueError(f"not every value is an integer that fits {dtype}")
         return cls(dtype=dtype, shape=array.shape, data=array.tobytes())
 
-    def view(self) -> NDArray[np.generic]:
+    def view(self) -> "NDArray[np.generic]":
         """Read-only view on the received bytes, shape and dtype as sent."""
+        import numpy as np
+
         return np.frombuffer(self.data, dtype=np.dtype(self.dtype)).reshape(self.shape)
 
-    def floats(self) -> NDArray[np.float64]:
+    def floats(self) -> "NDArray[np.float64]":
         """Content as a float64 array of the same shape."""
-        return self.view().astype(np.float64)
+        return self.view().astype("f8")
 
-    def ints(self) -> NDArray[np.int32]:
+    def ints(self) -> "NDArray[np.int32]":
         """Content as an int32 array of the same shape."""
-        return self.view().astype(np.int32)
+        return self.view().astype("i4")
 
 
 class Pose(Wire, frozen=True, kw_only=True):

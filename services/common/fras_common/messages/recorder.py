@@ -2,17 +2,27 @@
 
 from typing import Literal
 
-from fras_common.messages.base import Header, Wire
+import msgspec
+
+from fras_common.messages.base import Header, TrialName, Wire
 from fras_common.scenario.model import Scenario
 
 
 class OpenRequest(Wire, frozen=True, kw_only=True):
-    """Start the log of a trial in `directory` (on the recorder's host)."""
+    """Start the log of a trial in `directory` (on the recorder's host).
 
-    trial: str
+    Attributes
+    ----------
+    rules : dict of str to str
+        The rule files by which the planner decides, text by path below `asp/`: by value, for the
+        recorder may stand elsewhere. None where no planner asks, or one of an older version.
+    """
+
+    trial: TrialName
     scenario: Scenario
     mesh: bytes
     directory: str
+    rules: dict[str, str] = msgspec.field(default_factory=dict[str, str])
 
 
 class CloseRequest(Wire, frozen=True, kw_only=True):
@@ -33,6 +43,29 @@ class LastReply(Wire, frozen=True, kw_only=True):
     """It as it travelled; empty if none was heard."""
 
     payload: bytes
+
+
+class SinceRequest(Wire, frozen=True, kw_only=True):
+    """Ask for the messages of a key from a tick on, of its latest trial."""
+
+    key: str
+    tick: int
+
+
+class SinceReply(Wire, frozen=True, kw_only=True):
+    """They as they travelled, in the order in which they arrived.
+
+    Attributes
+    ----------
+    forgotten : bool
+        Whether there may have been earlier ones that the recorder no longer remembers.
+    more : bool
+        Whether there are later ones that did not fit: ask again from the last one's tick on.
+    """
+
+    payloads: list[bytes]
+    forgotten: bool
+    more: bool
 
 
 class CloseReply(Wire, frozen=True, kw_only=True):

@@ -8,7 +8,15 @@ Joints = tuple[float, float, float, float, float, float]
 
 
 class ArmState(Wire, frozen=True, kw_only=True):
-    """One PSM; joints are yaw, pitch, insertion [m], roll, wrist pitch, wrist yaw [rad]."""
+    """One PSM; joints are yaw, pitch, insertion [m], roll, wrist pitch, wrist yaw [rad].
+
+    Attributes
+    ----------
+    grasp_height_m : float or None
+        Height of the tip when the jaw closed; None while it is open.
+    hard_latched : bool
+        Whether the arm crossed the hard force limit and has not released since.
+    """
 
     joints: Joints
     joint_velocities: Joints
@@ -17,6 +25,8 @@ class ArmState(Wire, frozen=True, kw_only=True):
     setpoint_joints: Joints
     setpoint_jaw_rad: float
     operating_state: Literal["DISABLED", "ENABLED", "PAUSED", "FAULT"]
+    grasp_height_m: float | None = None
+    hard_latched: bool = False
 
 
 class ActionState(Wire, frozen=True, kw_only=True):

@@ -2,14 +2,14 @@
 
 import msgspec
 
-from fras_common.messages.base import Header, Wire
+from fras_common.messages.base import Header, TrialName, Wire
 from fras_common.scenario.model import Scenario
 
 
 class ResetRequest(Wire, frozen=True, kw_only=True):
     """Begin a trial: from now on messages of any other trial are dropped and counted."""
 
-    trial: str
+    trial: TrialName
     scenario: Scenario
     mesh: bytes = b""
 
@@ -37,6 +37,9 @@ class Health(Header, frozen=True, kw_only=True):
     refusals : dict
         What was refused or stopped since the start, by the name of what did it: a safeguard of
         motion (docs/reference/safety.md), else the type of the error.
+    loop_lag_s : float
+        How long the loop has not turned: the age of a job that waits in the inbox since an earlier
+        report; 0 if that one is done.
     facts : dict
         What only this service can say, e.g. which linear solver it uses.
     """
@@ -55,6 +58,7 @@ class Health(Header, frozen=True, kw_only=True):
     gaps: int
     facts: dict[str, str]
     refusals: dict[str, int] = msgspec.field(default_factory=dict[str, int])
+    loop_lag_s: float = 0.0
 
 
 class LogRecord(Header, frozen=True, kw_only=True):

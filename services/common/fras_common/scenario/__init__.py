@@ -1,7 +1,8 @@
 """Scenarios: what a trial is about, drawn from a seed or read from a file and checked."""
 
-from fras_common.scenario.generator import draw_scene, resolve
-from fras_common.scenario.geometry import attachment_raster, nodes_in_discs
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from fras_common.scenario.loader import ScenarioError, check, load, to_toml
 from fras_common.scenario.mesh import MeshFacts, fit_to_mesh
 from fras_common.scenario.model import (
@@ -16,6 +17,10 @@ from fras_common.scenario.model import (
     SceneSection,
     TissueSection,
 )
+
+if TYPE_CHECKING:
+    from fras_common.scenario.generator import draw_scene, resolve
+    from fras_common.scenario.geometry import attachment_raster, nodes_in_discs
 
 __all__ = [
     "AwarenessSection",
@@ -39,3 +44,17 @@ __all__ = [
     "resolve",
     "to_toml",
 ]
+
+_NEED_NUMPY = {
+    "attachment_raster": "geometry",
+    "draw_scene": "generator",
+    "nodes_in_discs": "geometry",
+    "resolve": "generator",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Load what needs numpy when it is first asked for: most processes never do."""
+    if name not in _NEED_NUMPY:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_NEED_NUMPY[name]}"), name)

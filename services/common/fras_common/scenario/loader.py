@@ -10,7 +10,8 @@ from typing import Any, cast, get_args
 import msgspec
 import tomlkit
 
-from fras_common.errors import FrasError
+from fras_common.errors import FrasError, shown
+from fras_common.files import TEXT_BYTES, read_at_most
 from fras_common.scenario.limits import breaches
 from fras_common.scenario.model import Scenario, Section
 
@@ -23,7 +24,7 @@ class ScenarioError(FrasError):
 
     def __init__(self, file: str, key: str, value: object, allowed: str) -> None:
         super().__init__(
-            f"{file}: {key} = {value!r}: {allowed}",
+            f"{file}: {key} = {shown(value)}: {allowed}",
             file=file,
             key=key,
             value=value,
@@ -40,7 +41,7 @@ def load(path: Path) -> Scenario:
         The file can't be read, is no TOML, or holds something that is not allowed.
     """
     try:
-        raw = tomllib.loads(path.read_text(encoding="utf-8"))
+        raw = tomllib.loads(read_at_most(path, TEXT_BYTES).decode())
     except (OSError, UnicodeDecodeError) as error:
         raise ScenarioError(str(path), "file", str(path), f"cannot be read: {error}") from error
     except (ValueError, RecursionError) as error:

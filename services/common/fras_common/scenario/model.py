@@ -15,6 +15,8 @@ Fraction = Annotated[float, Meta(ge=0, le=1)]
 Length = Annotated[float, Meta(gt=0, le=1.0)]
 Coordinate = Annotated[float, Meta(ge=-1.0, le=1.0)]
 NodeCount = Annotated[int, Meta(ge=2, le=200)]
+Name = Annotated[str, Meta(max_length=200)]
+PathName = Annotated[str, Meta(max_length=1000)]
 
 
 class Section(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -46,7 +48,7 @@ class TissueSection(Section, frozen=True, kw_only=True):
 
     size_m: tuple[Length, Length, Length] = (0.1, 0.12, 0.005)
     node_counts: tuple[NodeCount, NodeCount, NodeCount] = (21, 25, 2)
-    mesh_file: str | None = None
+    mesh_file: PathName | None = None
     mesh_scale: Annotated[float, Meta(gt=0, le=1e6)] = 1.0
     element: Literal["hex8-sri", "hex8", "tet4", "tet10"] = "hex8-sri"
     material: Literal["svk", "neo-hookean"] = "svk"
@@ -75,7 +77,7 @@ class SceneSection(Section, frozen=True, kw_only=True):
     """
 
     roi_m: tuple[Coordinate, Coordinate, Coordinate]
-    discs: tuple[Disc, ...] = ()
+    discs: Annotated[tuple[Disc, ...], Meta(max_length=1000)] = ()
     redraws: Annotated[int, Meta(ge=0)] = 0
 
 
@@ -135,6 +137,8 @@ class PlannerSection(Section, frozen=True, kw_only=True):
         `clear` also asks that no arm stands at its maximal height.
     time_limit_s : float
         Seconds of search after which a plan is given up.
+    confirm : bool
+        Nothing of a new plan is done before a person has approved it.
     """
 
     criterion: Literal["sum", "literal", "lex", "nearest", "weighted"] = "weighted"
@@ -142,6 +146,7 @@ class PlannerSection(Section, frozen=True, kw_only=True):
     ignore_ap: bool = False
     max_replans: Annotated[int, Meta(ge=0, le=100)] = 5
     time_limit_s: Annotated[float, Meta(gt=0, le=600)] = 5.0
+    confirm: bool = False
 
 
 class Box(Section, frozen=True, kw_only=True):
@@ -180,7 +185,7 @@ class MotionSection(Section, frozen=True, kw_only=True):
     joint_noise_rad: Annotated[float, Meta(ge=0, le=0.1)] = 0.0
     insertion_noise_m: Annotated[float, Meta(ge=0, le=0.01)] = 0.0
     instrument_clearance_m: Annotated[float, Meta(gt=0, le=0.03)] = 0.002
-    forbidden_boxes: tuple[Box, ...] = ()
+    forbidden_boxes: Annotated[tuple[Box, ...], Meta(max_length=100)] = ()
 
 
 class RunSection(Section, frozen=True, kw_only=True):
@@ -196,18 +201,39 @@ class RunSection(Section, frozen=True, kw_only=True):
         A hold that nobody lifts ends the trial; 0 = it waits for ever.
     require_log : bool
         Nothing moves that is not recorded.
+    supervised : bool
+        Nothing moves while nobody who could stop it looks at the surgeon's page.
     """
 
     pace: Annotated[float, Meta(ge=0, le=1000)] = 1.0
     peer_timeout_s: Annotated[float, Meta(gt=0, le=600)] = 10.0
     hold_timeout_s: Annotated[float, Meta(ge=0, le=86400)] = 30.0
     require_log: bool = True
+    supervised: bool = False
+
+
+class RecorderSection(Section, frozen=True, kw_only=True):
+    """How the log is written; nothing here changes what it holds.
+
+    Attributes
+    ----------
+    rotate_bytes : int
+        The next file of the log begins when one has grown to this size; 0 = never.
+    rotate_s : float
+        And when one is so old; 0 = never.
+    fsync : bool
+        Each half second, wait until the disk has what was written: a power cut costs no more.
+    """
+
+    rotate_bytes: Annotated[int, Meta(ge=0, le=2**40)] = 2**28
+    rotate_s: Annotated[float, Meta(ge=0, le=604800)] = 0.0
+    fsync: bool = True
 
 
 class Scenario(Section, frozen=True, kw_only=True):
     """One trial: everything that decides its result, and how fast to run it."""
 
-    name: str = "default"
+    name: Name = "default"
     seed: Annotated[int, Meta(ge=0, lt=2**53)] = 0
     tissue: TissueSection = TissueSection()
     scene: SceneSection | None = None
@@ -216,3 +242,4 @@ class Scenario(Section, frozen=True, kw_only=True):
     planner: PlannerSection = PlannerSection()
     motion: MotionSection = MotionSection()
     run: RunSection = RunSection()
+    recorder: RecorderSection = RecorderSection()

@@ -4,10 +4,16 @@ import psutil
 
 
 class ProcessMeter:
-    """Resident memory and processor share of the process that makes it."""
+    """Resident memory and processor share of a process: the one that makes it, or another.
 
-    def __init__(self) -> None:
-        self._process = psutil.Process()
+    Raises
+    ------
+    psutil.NoSuchProcess
+        There is none of that id, then or later.
+    """
+
+    def __init__(self, pid: int | None = None) -> None:
+        self._process = psutil.Process(pid)
         self._process.cpu_percent()
 
     def rss_bytes(self) -> int:

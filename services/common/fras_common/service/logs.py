@@ -48,24 +48,47 @@ def configure_logging(service: str, level: str, emit: Emit) -> structlog.stdlib.
     emit : callable
         Gets each record from WARNING up, to be published on `log/<service>`.
     """
+    structlog.configure(
+        processors=_processors(emit),
+        wrapper_class=structlog.make_filtering_bound_logger(logging.getLevelNamesMapping()[level]),
+        logger_factory=structlog.PrintLoggerFactory(file=cast(TextIO, Stderr())),
+        cache_logger_on_first_use=False,
+    )
+    return structlog.get_logger(service=service)
 
+
+def logger_to(service: str, file: TextIO, emit: Emit) -> structlog.stdlib.BoundLogger:
+    """Return a logger of a part of this process, which leaves the set-up of the rest alone.
+
+    Parameters
+    ----------
+    service : str
+    file : TextIO
+        Gets the lines.
+    emit : callable
+        Gets each record from WARNING up, to be published on `log/<service>`.
+    """
+    return structlog.wrap_logger(
+        structlog.PrintLogger(file),
+        processors=_processors(emit),
+        wrapper_class=structlog.make_filtering_bound_logger(logging.INFO),
+        cache_logger_on_first_use=False,
+        service=service,
+    )
+
+
+def _processors(emit: Emit) -> list[Any]:
     def publish(_logger: Any, method: str, event: MutableMapping[str, Any]) -> Mapping[str, Any]:
         if method in {"warning", "error", "critical"}:
             fields = {key: str(value) for key, value in event.items() if key != "event"}
             emit(LogRecord(level=method, event=str(event["event"]), fields=fields))
         return event
 
-    structlog.configure(
-        processors=[
-            structlog.processors.add_log_level,
-            structlog.processors.format_exc_info,
-            publish,
-            structlog.processors.TimeStamper(fmt="iso", utc=True),
-            in_reading_order,
-            structlog.processors.JSONRenderer(sort_keys=False, default=str),
-        ],
-        wrapper_class=structlog.make_filtering_bound_logger(logging.getLevelNamesMapping()[level]),
-        logger_factory=structlog.PrintLoggerFactory(file=cast(TextIO, Stderr())),
-        cache_logger_on_first_use=False,
-    )
-    return structlog.get_logger(service=service)
+    return [
+        structlog.processors.add_log_level,
+        structlog.processors.format_exc_info,
+        publish,
+        structlog.processors.TimeStamper(fmt="iso", utc=True),
+        in_reading_order,
+        structlog.processors.JSONRenderer(sort_keys=False, default=str),
+    ]

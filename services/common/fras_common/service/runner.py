@@ -14,10 +14,11 @@ from typing import Protocol
 from fras_common.bus import Bus
 from fras_common.bus.zenoh_bus import NoRouter, ZenohBus
 from fras_common.errors import FrasError
-from fras_common.service.extras import MissingExtra, require_extra
+from fras_common.extras import MissingExtra, require_extra
+from fras_common.identity import BadIdentity, identity_in
 from fras_common.service.host import ServiceHost
 from fras_common.service.logs import configure_logging
-from fras_common.service.signals import StopFlag
+from fras_common.signals import StopFlag
 
 EXIT_START = 3
 
@@ -39,22 +40,29 @@ class Service(Protocol):
 
 
 Build = Callable[..., Service]
+AddArguments = Callable[[argparse.ArgumentParser], Sequence[str]]
 
 
-def parse_arguments(
+def make_parser(
     name: str,
-    argv: list[str] | None,
     description: str,
     paths: Mapping[str, str] | None = None,
     choices: Mapping[str, Sequence[str]] | None = None,
-) -> argparse.Namespace:
+) -> argparse.ArgumentParser:
     """Arguments that every service takes, and the paths and choices that this one does."""
     parser = argparse.ArgumentParser(prog=f"fras {name}", description=description)
     parser.add_argument("--cell", default="local", help="cell (Zenoh namespace fras/<cell>)")
     parser.add_argument(
         "--connect", default="tcp/127.0.0.1:7447", help="endpoint of the Zenoh router"
     )
-    parser.add_argument("--instance", default="", help="name of this instance (default: random)")
+    parser.add_argument(
+        "--tls", type=Path, metavar="DIR", help="folder of `fras keys` with this service's own"
+    )
+    parser.add_argument(
+        "--instance",
+        default="",
+        help="name of this instance, another at each start (default: random)",
+    )
     parser.add_argument(
         "--log-level", default="INFO", choices=["DEBUG", "INFO", "WARNING", "ERROR"]
     )
@@ -65,7 +73,18 @@ def parse_arguments(
         parser.add_argument(
             f"--{choice}", choices=allowed, default=allowed[0], help="(default: %(default)s)"
         )
-    return parser.parse_args(argv)
+    return parser
+
+
+def parse_arguments(
+    name: str,
+    argv: list[str] | None,
+    description: str,
+    paths: Mapping[str, str] | None = None,
+    choices: Mapping[str, Sequence[str]] | None = None,
+) -> argparse.Namespace:
+    """Read them from a command line."""
+    return make_parser(name, description, paths, choices).parse_args(argv)
 
 
 def run_service(
@@ -76,6 +95,7 @@ def run_service(
     paths: Mapping[str, str] | None = None,
     choices: Mapping[str, Sequence[str]] | None = None,
     extra: str = "",
+    add: AddArguments = lambda parser: (),
 ) -> int:
     """Run a service until it is told to stop.
 
@@ -97,18 +117,20 @@ def run_service(
         default.
     extra : str
         Which of the distribution's extras holds its libraries; by default that of its own name.
+    add : callable, optional
+        Adds arguments of another kind to the parser, and names those that the shell takes.
 
     Returns
     -------
     int
-        Exit status: 0 after a stop, 3 if a library is missing, the router can't be reached or the
-        shell can't be made of what it was given.
+        Exit status: 0 after a stop (one that comes before the libraries are loaded ends the process
+        by its signal), 3 if a library is missing, the router can't be reached, the
+        keys can't be used or the shell can't be made of what it was given.
     """
-    paths, choices = paths or {}, choices or {}
-    options = parse_arguments(name, argv, description, paths, choices)
-    given = {option: getattr(options, option) for option in (*paths, *choices)}
-    stop = StopFlag()
-    stop.install()
+    parser = make_parser(name, description, paths, choices)
+    own = (*(paths or ()), *(choices or ()), *add(parser))
+    options = parser.parse_args(argv)
+    given = {option: getattr(options, option) for option in own}
     host = ServiceHost(name)
     host.log = configure_logging(name, options.log_level, host.publish_log)
     instance = options.instance or uuid.uuid4().hex[:4]
@@ -118,11 +140,18 @@ def run_service(
     except MissingExtra as error:
         print(f"fras {name}: {error}", file=sys.stderr)
         return EXIT_START
+    # Not before: whoever is stopped while libraries are loaded ends at once.
+    stop = StopFlag()
+    stop.install()
     try:
         bus = ZenohBus(
-            options.cell, options.connect, f"{name}/{instance}", on_malformed=host.count_malformed
+            options.cell,
+            options.connect,
+            f"{name}/{instance}",
+            on_malformed=host.count_malformed,
+            identity=identity_in(options.tls, name) if options.tls is not None else None,
         )
-    except NoRouter as error:
+    except (BadIdentity, NoRouter) as error:
         print(f"fras {name}: {error}", file=sys.stderr)
         return EXIT_START
     try:

@@ -4,8 +4,26 @@ import os
 import queue
 import signal
 import threading
+from collections.abc import Generator
+from contextlib import contextmanager
 
 GRACE_S = 10.0
+
+
+@contextmanager
+def silent_interrupt() -> Generator[None]:
+    """Let SIGINT end the process at once within the block, without a traceback.
+
+    For as long as libraries are loaded and nothing is open yet: a KeyboardInterrupt would come up
+    anywhere in them. Whoever installs a handler within the block has it until the block's end.
+    """
+    before = signal.getsignal(signal.SIGINT)
+    if before is signal.default_int_handler:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 class StopFlag:

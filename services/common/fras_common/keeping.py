@@ -1,0 +1,38 @@
+"""How much is kept of each key, by who publishes it and by the recorder."""
+
+from typing import Final
+
+from fras_common.topics import (
+    FAULT,
+    HEALTH,
+    KEPT,
+    LOG,
+    QUERIES,
+    SERVICES,
+    TOOLS,
+    TOPICS,
+    topic_of,
+)
+
+__all__ = ["is_of_ours", "kept_of"]
+
+_BY_MIRROR: Final = {query.mirror: query.kept for query in QUERIES}
+_MEMBERS: Final = tuple(
+    topic.of(service=service).key
+    for topic in (HEALTH, LOG, FAULT)
+    for service in (*SERVICES, *TOOLS, "arms")
+)
+_OURS: Final = frozenset([*(one.key for one in TOPICS), *_BY_MIRROR, *_MEMBERS])
+
+
+def kept_of(key: str) -> int:
+    """Tell how many messages of a concrete key are kept at the most."""
+    if (kept := _BY_MIRROR.get(key)) is not None:
+        return kept
+    topic = topic_of(key)
+    return topic.kept if topic is not None else KEPT
+
+
+def is_of_ours(key: str) -> bool:
+    """Whether one of our services has a concrete key: of others there is no end."""
+    return key in _OURS

@@ -1,0 +1,107 @@
+"""What is cached is asked for piece by piece, none of them large."""
+
+from collections.abc import Callable
+
+import pytest
+
+from fras_common.bus import RawSample
+from fras_common.bus.past import AT_ONCE, PIECE_BYTES, PIECE_SAMPLES, PIECE_SHARE, Cached, Past
+from fras_common.keeping import kept_of
+
+TIMEOUT_S = 20.0
+LARGE, SMALL, ONE = "sim/tissue_state", "sa/verdict", "sim/tissue_model"
+
+
+class Cell:
+    """Publishers with full caches; an answer comes when `answer` says so."""
+
+    def __init__(self) -> None:
+        self.now_s = 0.0
+        self.caches = {
+            (LARGE, "a/1"): [bytes(40_000)] * 1500,
+            (SMALL, "b/1"): [bytes(100)] * 700,
+            (SMALL, "b/2"): [bytes(100)] * 3,
+            (ONE, "a/2"): [bytes(10)],
+        }
+        self.open: list[tuple[str, Callable[[Cached], None], Callable[[], None], float]] = []
+        self.answered: list[tuple[str, int, int]] = []
+        self.most_open = 0
+
+    def get(
+        self,
+        selector: str,
+        note: Callable[[Cached], None],
+        on_end: Callable[[], None],
+        timeout_s: float,
+    ) -> None:
+        self.open.append((selector, note, on_end, timeout_s))
+        self.most_open = max(self.most_open, len(self.open))
+
+    def answer(self, place: int = 0) -> None:
+        selector, note, on_end, timeout_s = self.open.pop(place)
+        assert 0.0 < timeout_s <= TIMEOUT_S * PIECE_SHARE
+        where, _, which = selector.partition("?")
+        said: list[bytes] = []
+        for (key, publisher), cache in self.caches.items():
+            if which == "_max=1":
+                numbers = range(len(cache) - 1, len(cache))
+            elif where == f"{key}/@adv/pub/{publisher}/**":
+                first, last = map(int, which.removeprefix("_sn=").split(".."))
+                numbers = range(max(first, len(cache) - kept_of(key)), last + 1)
+            else:
+                continue
+            for number in numbers:
+                note(Cached(RawSample(key, cache[number], ""), publisher, number))
+                said.append(cache[number])
+        self.answered.append((selector, len(said), sum(map(len, said))))
+        on_end()
+
+
+def asked(cell: Cell) -> list[list[RawSample]]:
+    done: list[list[RawSample]] = []
+    Past(cell.get, done.append, TIMEOUT_S, lambda: cell.now_s).ask("**")
+    return done
+
+
+def test_all_comes_and_no_piece_is_large():
+    cell = Cell()
+    for number, key in enumerate(cell.caches):
+        cell.caches[key] = [
+            payload[:-8] + bytes([number]) + count.to_bytes(7, "big")
+            for count, payload in enumerate(cell.caches[key])
+        ]
+    done = asked(cell)
+    while cell.open:
+        assert not done
+        # The later of those under way may be answered first.
+        cell.answer(-1)
+    (found,) = done
+    expected = [one for (key, _), cache in cell.caches.items() for one in cache[-kept_of(key) :]]
+    assert [sample.payload for sample in found] == expected
+    assert cell.most_open == AT_ONCE
+    first, *pieces = cell.answered
+    assert first[0] == "**/@adv/**?_max=1"
+    assert len(pieces) > 1000 * 40_000 // PIECE_BYTES
+    assert all(0 < count <= PIECE_SAMPLES and size <= PIECE_BYTES for _, count, size in pieces)
+
+
+@pytest.mark.parametrize("answers", [1, 5, 20])
+def test_what_came_in_time_is_told_when_time_is_over(answers: int):
+    cell = Cell()
+    done = asked(cell)
+    for _ in range(answers):
+        cell.answer()
+    cell.now_s = TIMEOUT_S + 0.1
+    while cell.open:
+        cell.answer()
+    assert len(cell.answered) == answers + AT_ONCE
+    (found,) = done
+    assert len(found) == sum(count for _, count, _ in cell.answered)
+
+
+def test_an_empty_cell_answers_at_once():
+    cell = Cell()
+    cell.caches = {}
+    done = asked(cell)
+    cell.answer()
+    assert done == [[]]
