@@ -7,9 +7,10 @@ from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 from tests.cli.report import conftest as made
 
 from fras_common.messages import Context
-from fras_log import Signer
+from fras_log import Signer, Verification, verify_file
 from fras_log.export import Format, export
-from support.damage import Whole, write_log
+from support.damage import Verify, Whole, write_log
+from support.forger import Piece, take_apart
 
 UNDER_WAY_NS = 777_777
 CELLS = [(i, j) for i in range(1, 8) for j in range(1, 8)]
@@ -67,3 +68,21 @@ def whole(tmp_path_factory: pytest.TempPathFactory, signer: Signer) -> Whole:
     path = tmp_path_factory.mktemp("whole") / "audit.mcap"
     write_log(path, signer)
     return Whole(path.read_bytes())
+
+
+@pytest.fixture
+def verify(tmp_path: Path, signer: Signer) -> Verify:
+    """Verify bytes as a file of a log whose signer is known."""
+
+    def verify_bytes(data: bytes) -> Verification:
+        path = tmp_path / "forged.mcap"
+        path.write_bytes(data)
+        return verify_file(path, [signer.public])
+
+    return verify_bytes
+
+
+@pytest.fixture
+def pieces(whole: Whole) -> list[Piece]:
+    """The log taken apart, for a test to change."""
+    return take_apart(whole.data)

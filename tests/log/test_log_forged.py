@@ -17,7 +17,7 @@ from fras_common.messages import Verdict
 from fras_log import Finding, Signer, Verification, verify_file
 from fras_log.chain import Chain, Checkpoint, first_head, leaf
 from fras_log.scan import Recorded, scan
-from support.damage import Message, Whole, write_log
+from support.damage import Message, Verify, Whole, write_log
 from support.forger import (
     MAGIC,
     ChunkPiece,
@@ -30,27 +30,9 @@ from support.forger import (
     put_together,
     read,
     repair_checksums,
-    take_apart,
 )
 
-Verify = Callable[[bytes], Verification]
 MIDDLE = 4
-
-
-@pytest.fixture
-def verify(tmp_path: Path, signer: Signer) -> Verify:
-    def verify_bytes(data: bytes) -> Verification:
-        path = tmp_path / "forged.mcap"
-        path.write_bytes(data)
-        return verify_file(path, [signer.public])
-
-    return verify_bytes
-
-
-@pytest.fixture
-def pieces(whole: Whole) -> list[Piece]:
-    """The log taken apart, for a test to change."""
-    return take_apart(whole.data)
 
 
 def at(whole: Whole, chunk: int, number: int) -> Message:

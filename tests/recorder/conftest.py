@@ -1,6 +1,7 @@
 """A recorder on a bus in memory, its loop in a thread, and someone who speaks to it."""
 
 import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -18,11 +19,11 @@ from fras_common.messages import (
     RobotState,
     TaskStatus,
     TissueState,
-    Verdict,
 )
 from fras_common.messages import base as wire
 from fras_common.messages.sim import SolverReport
 from fras_common.scenario import Scenario
+from fras_common.scenario.model import RecorderSection
 from fras_common.service import ServiceHost
 from fras_common.topics import (
     RECORDER_CLOSE,
@@ -34,6 +35,7 @@ from fras_common.topics import (
     VERDICT,
 )
 from fras_recorder.service import RecorderService
+from support.verdicts import verdict
 
 WAIT_S = 10.0
 EMPTY = wire.Array(dtype="<f4", shape=(0, 3), data=b"")
@@ -42,18 +44,27 @@ EMPTY = wire.Array(dtype="<f4", shape=(0, 3), data=b"")
 class Stage:
     """A recorder with its loop in a thread, and someone who speaks to it."""
 
-    def __init__(self) -> None:
-        self.fabric = MemoryFabric()
+    def __init__(self, before: "Stage | None" = None) -> None:
+        self.fabric = before.fabric if before is not None else MemoryFabric()
+        # What the speakers' clocks are ahead of the recorder's.
+        self.ahead_ns = 0
         self.host = ServiceHost("recorder")
-        self._own = MemoryBus(self.fabric, "test", "recorder/1")
+        self._own = MemoryBus(self.fabric, "test", f"recorder/{2 if before else 1}")
         self.host.attach(self._own)
-        self.speaker = MemoryBus(self.fabric, "test", "speaker/1")
+        self.speaker = before.speaker if before else MemoryBus(self.fabric, "test", "speaker/1")
         self.service = RecorderService(self.host)
         self._deliver = self.service._on_sample  # noqa: SLF001 - as the bus does
         self._loop = threading.Thread(target=self.host.run, args=(self.service.wake,))
         self._loop.start()
         topics: Any = (ROBOT_STATE, TISSUE_STATE, VERDICT, TASK_STATUS)
-        self._publishers = {topic.key: self.speaker.publisher(topic) for topic in topics}
+        self._publishers: dict[str, Any] = (
+            before._publishers  # noqa: SLF001 - of the same kind
+            if before is not None
+            else {
+                topic.key: self.other_bus(f"{topic.producer}/1").publisher(topic)
+                for topic in topics
+            }
+        )
         self.states: list[RecorderStatus] = []
         self._changed = threading.Condition()
         self.speaker.subscribe(RECORDER_STATUS, self._on_state)
@@ -93,9 +104,20 @@ class Stage:
         """Say that the trial has ended."""
         return self.say(task_status(trial), "planner/task_status")
 
-    def open(self, directory: Path, trial: str = "t-1", mesh: bytes = b"") -> ResetReply:
+    def open(
+        self,
+        directory: Path,
+        trial: str = "t-1",
+        mesh: bytes = b"",
+        rules: dict[str, str] | None = None,
+        **recorder: Any,
+    ) -> ResetReply:
         request = OpenRequest(
-            trial=trial, scenario=Scenario(seed=4), mesh=mesh, directory=str(directory)
+            trial=trial,
+            scenario=Scenario(seed=4, recorder=RecorderSection(**recorder)),
+            mesh=mesh,
+            directory=str(directory),
+            rules=rules or {},
         )
         return self.speaker.query(RECORDER_OPEN, request, WAIT_S)
 
@@ -111,7 +133,9 @@ class Stage:
 
     def other_bus(self, source: str) -> MemoryBus:
         """Another participant of the cell."""
-        return MemoryBus(self.fabric, "test", source)
+        return MemoryBus(
+            self.fabric, "test", source, clock_ns=lambda: time.time_ns() + self.ahead_ns
+        )
 
     def until_last(self, state: str) -> None:
         """Wait until the latest state is this one."""
@@ -119,10 +143,29 @@ class Stage:
             assert self._changed.wait_for(lambda: self.states[-1].state == state, WAIT_S)
 
     def settle(self) -> None:
-        """Wait until everything said so far has been handled."""
+        """Wait until everything said so far has been written and handled."""
+        for post in (self.service._writing._queue.put, self.host.post):  # noqa: SLF001
+            done = threading.Event()
+            post(done.set)
+            assert done.wait(WAIT_S)
+
+    def kill(self) -> "Stage":
+        """End it as SIGKILL does, and start another one."""
+        self.host.stop()
+        self._loop.join(WAIT_S)
+        writing = self.service._writing  # noqa: SLF001 - as the kernel does
         done = threading.Event()
-        self.host.post(done.set)
+
+        def vanish() -> None:
+            log, writing._log = writing._log, None  # noqa: SLF001
+            if log is not None:
+                log.abandon()
+            done.set()
+
+        writing._queue.put(vanish)  # noqa: SLF001
         assert done.wait(WAIT_S)
+        self._own.close()
+        return Stage(self)
 
     def end(self) -> None:
         """End the process, as far as the recorder can tell; idempotent."""
@@ -163,15 +206,6 @@ def tissue_state(tick: int, trial: str) -> TissueState:
         tick=tick, trial=trial, nodes_m=EMPTY, nodal_force_n=EMPTY, max_force_n=0.0,
         max_node_speed_m_s=0.0, tool_force_n={}, grasped={}, grasped_force_n={},
         patch_force_n=EMPTY, balance_residual_n=0.0, solver=solver,
-    )  # fmt: skip
-
-
-def verdict(tick: int, trial: str) -> Verdict:
-    return Verdict(
-        tick=tick, trial=trial, level="ok", ok=True, reason="", max_force_n=0.0, limit_n=0.5,
-        hard_limit_n=1.0, visibility=0.0, visible=False, max_height=[], force_rate_n_s=0.0,
-        crossing_tick=-1, max_node_speed_m_s=0.0,
-        grasped={},
     )  # fmt: skip
 
 

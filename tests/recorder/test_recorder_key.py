@@ -23,7 +23,7 @@ def endpoint() -> Iterator[str]:
         probe.bind(("127.0.0.1", 0))
         endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
     end = threading.Event()
-    thread = threading.Thread(target=route, args=(endpoint, end.wait))
+    thread = threading.Thread(target=route, args=([endpoint], end.wait))
     thread.start()
     yield endpoint
     end.set()

@@ -1,7 +1,9 @@
 """The recorder's shell on a bus in memory: open, listen, wait, close."""
 
+import platform
 import threading
 import time
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -10,12 +12,17 @@ from mcap.reader import make_reader
 from mcap.records import Channel, Message
 
 from fras_common.bus import RawSample, RemoteFault
-from fras_common.codec import content_digest, decode
-from fras_common.messages import CloseReply, LastRequest, RecorderEvent, Verdict
+from fras_common.codec import content_digest, decode, encode
+from fras_common.digests import rules_digest, table_digest
+from fras_common.messages import CloseReply, LastRequest, RecorderEvent, SinceRequest, Verdict
 from fras_common.scenario import Scenario, to_toml
-from fras_common.topics import HEALTH, RECORDER_LAST
-from fras_log import LogFile
+from fras_common.service.build import build_of_this_process
+from fras_common.topics import HEALTH, QUERIES, RECORDER_LAST, RECORDER_SINCE, TOPICS
+from fras_log import LogFile, verify_file
+from fras_log.attachments import read_attachments, rules_in
 from fras_recorder import service as recorder
+from fras_recorder import writing
+from support.verdicts import verdict
 
 Stage = Any  # the fixture's class, in conftest.py, can't be imported from here
 
@@ -70,8 +77,27 @@ def test_the_log_carries_the_scenario(stage: Stage, tmp_path: Path):
     said = metadata(path)
     assert said["fras"]["trial"] == "t-1"
     assert said["fras"]["scenario"] == written
-    assert {"fras_version", "python_version", "host"} <= set(said["fras"])
+    assert said["fras"]["fras_version"] == version("fras")
+    assert said["fras"]["python_version"] == platform.python_version()
+    assert said["fras"]["host"] == platform.node()
+    assert said["fras"]["build"] == build_of_this_process()
+    assert said["fras"]["topics_digest"] == table_digest(TOPICS, QUERIES)
+    assert "asp_digest" not in said["fras"]
     assert said["fras.closed"]["reason"] == "closed"
+
+
+def test_the_log_carries_the_rules_that_came_with_the_request(stage: Stage, tmp_path: Path):
+    """By value: they need not be on the recorder's machine."""
+    rules = {"goal.lp": "% für alle\n", "preferences/lex.lp": "% lex\n"}
+    stage.open(tmp_path, rules=rules)
+    stage.task()
+    stage.ask_close(-1, 0).wait()
+    path = tmp_path / "audit.mcap"
+    attached = read_attachments(path)
+    assert rules_in(attached, path) == rules
+    assert set(attached) == {"scenario.toml", "asp/goal.lp", "asp/preferences/lex.lp"}
+    assert metadata(path)["fras"]["asp_digest"] == rules_digest(rules)
+    assert verify_file(path).intact
 
 
 def test_the_close_waits_for_the_last_tick_of_each_key(
@@ -278,11 +304,7 @@ def test_what_is_written_can_be_decoded(stage: Stage, tmp_path: Path):
 
 
 def a_verdict(seq: int) -> Verdict:
-    return Verdict(
-        seq=seq, source="sa/7", trial="t-1", tick=seq, level="ok", ok=True, reason="",
-        max_force_n=0.0, limit_n=0.5, hard_limit_n=1.0, visibility=0.0, visible=False,
-        max_height=[], force_rate_n_s=0.0, crossing_tick=-1, max_node_speed_m_s=0.0, grasped={},
-    )  # fmt: skip
+    return verdict(seq, seq=seq, source="sa/7")
 
 
 def messages_of(path: Path, key: str, kind: Any) -> list[Any]:
@@ -318,7 +340,8 @@ def test_who_is_there_comes_and_goes_and_what_is_missing_stands_in_the_log(
 def test_a_recorder_with_too_much_to_write_says_so_and_when_it_has_caught_up(
     stage: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    monkeypatch.setattr(recorder, "BEHIND", 20)
+    monkeypatch.setattr(writing, "BEHIND", 20 / writing.PLACES)
+    monkeypatch.setattr(writing, "CAUGHT_UP", 2 / writing.PLACES)
     stage.until("idle")
     stage.open(tmp_path)
     stage.until("recording")
@@ -354,6 +377,12 @@ def test_the_last_message_of_a_key_is_told_with_or_without_a_log(stage: Stage, t
     stage.verdict(2)
     stage.speaker.query(RECORDER_LAST, LastRequest(key="health/nobody"), 5.0)
     assert decode(Verdict, last(stage, "sa/verdict"), "sa/verdict").tick == 2
+
+
+def test_the_messages_since_a_tick_are_told(stage: Stage):
+    sent = [stage.verdict(tick) for tick in range(5)]
+    reply = stage.speaker.query(RECORDER_SINCE, SinceRequest(key="sa/verdict", tick=3), 5.0)
+    assert reply.payloads == [encode(one) for one in sent[3:]]
 
 
 def last(stage: Stage, key: str) -> bytes:

@@ -3,12 +3,13 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from fras_audit.planner import context_of, maker_of, request_for
+from fras_audit.planner import context_of, maker_of
 from fras_audit.recorded import Recorded
 from fras_common.errors import FrasError
 from fras_common.messages import Plan
 from fras_common.topics import PLAN
 from fras_planner.knowledge import load_knowledge
+from fras_planner.memory import PlanRequest
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,7 @@ def decide_by(recorded: Recorded, asp_dir: Path) -> Decisions:
             skipped += 1
             continue
         try:
-            other = maker(context, request_for(plan))
+            other = maker(context, PlanRequest.of(plan))
         except FrasError as error:
             found.append(_decision(plan, ("refused",), (str(error),)))
             continue

@@ -9,6 +9,7 @@ from fras_audit.holds import audit_holds
 from fras_audit.playback import playback_drivers
 from fras_audit.progress import Progress
 from fras_audit.recorded import Recorded, reply_of, request_of
+from fras_audit.supervision import audit_supervision
 from fras_audit.ticks import first_of_tick
 from fras_common.errors import FrasError
 from fras_common.messages import (
@@ -24,6 +25,7 @@ from fras_common.topics import (
     EXECUTE,
     MOTION_RESET,
     ROBOT_STATE,
+    TASK_STATUS,
     VERDICT,
 )
 from fras_motion import states as core
@@ -33,13 +35,16 @@ from fras_motion.adapter import (
     in_words,
     parameters_of,
     robot_state,
+    snapshot_of,
     verdict_of,
 )
 from fras_motion.errors import Refused
-from fras_motion.holds import Holds
+from fras_motion.holds import RESTART, Holds
+from fras_motion.resumption import interrupted
 from fras_motion.trial import CANCELLER, MotionTrial
 
-BUSY = "busy"
+# Answered while a goal is under way, and so asked of the same state.
+MEANWHILE = ("busy", "goal_used")
 # Ends that a clock or a client decided, which no verdict leads to.
 _BY_OTHERS = {"cancelled", "reset", "hold:sim", "hold:sa"}
 
@@ -57,9 +62,13 @@ def audit(recorded: Recorded, progress: Progress) -> list[Tally]:
     Returns
     -------
     list of Tally
-        Robot states, results, goals, holds.
+        Robot states, results, goals, holds, and in a supervised trial its supervision.
     """
-    return [*_Audit(recorded).run(progress), audit_holds(recorded)]
+    return [
+        *_Audit(recorded).run(progress),
+        audit_holds(recorded),
+        *audit_supervision(recorded),
+    ]
 
 
 class _Audit:
@@ -67,7 +76,7 @@ class _Audit:
         tolerance = rounding(recorded, "motion")
         self._recorded = recorded
         self._said = recorded.of(ROBOT_STATE)
-        self._ends = {one.goal_id: one for one in recorded.of(ACTION_RESULT)}
+        self._ends: dict[str, ActionResult] = {}
         self._verdicts = first_of_tick(recorded.of(VERDICT))
         asked = [one for one in recorded.mirrors(EXECUTE) if one.fault is None]
         self._asked: deque[RpcRecord] = deque(asked)
@@ -75,7 +84,14 @@ class _Audit:
         self._results = Tally("motion", "results", len(recorded.of(ACTION_RESULT)), tolerance)
         self._goals = Tally("motion", "goals", len(asked))
         self._latest_goal = ""
+        self._put_before: set[str] = set()
+        self._accepted: ExecuteRequest | None = None
         self._holds = Holds()
+        for one in recorded.of(ACTION_RESULT):
+            first = self._ends.setdefault(one.goal_id, one)
+            if first is not one:
+                # A motion that starts again says the last one again.
+                self._results.compare_messages(f"result of {one.goal_id} again", one, first)
 
     def run(self, progress: Progress) -> list[Tally]:
         tallies = [self._states, self._results, self._goals]
@@ -94,23 +110,56 @@ class _Audit:
                 f"the arms are driven by {self._recorded.arms_by}: what they measured is taken "
                 "as recorded, what was sent to them is derived"
             )
-        parameters = parameters_of(reset.scenario)
-        trial = MotionTrial(self._recorded.trial, parameters, self._holds, Counter(), self._drivers)
+        self._parameters = parameters_of(reset.scenario)
+        trial = self._new_trial()
+        before = self._said[0]
         try:
             for number, said in enumerate(self._said, start=1):
+                if said.source != before.source:
+                    trial = self._take_over(trial, before, said)
                 self._go_on(trial, said)
+                before = said
                 progress("motion", number, len(self._said))
             self._flush(trial)
         except _Lost as lost:
             self._states.notes.append(str(lost))
         return tallies
 
+    def _new_trial(self) -> MotionTrial:
+        name, parameters = self._recorded.trial, self._parameters
+        return MotionTrial(name, parameters, self._holds, Counter(), self._drivers)
+
+    def _take_over(self, trial: MotionTrial, before: RobotState, said: RobotState) -> MotionTrial:
+        """Let another motion stand where the one before it stood, and end what that one did."""
+        self._states.notes.append(f"another motion took over at tick {said.tick}: {said.source}")
+        while self._asked and self._asked[0].source == before.source:
+            self._ask_next(trial)
+        self._holds.hold(RESTART, said.holds.get(RESTART, ""))
+        after = self._new_trial()
+        after.resume(snapshot_of(before), self._put_before)
+        for goal_id, end in list(self._ends.items()):
+            if end.source == said.source and end.reason == RESTART:
+                self._compare_interrupted(end, before.tick)
+                del self._ends[goal_id]
+        return after
+
+    def _compare_interrupted(self, end: ActionResult, tick: int) -> None:
+        """Compare how the action ended that was under way, as the executive had told it."""
+        where = f"result of {end.goal_id}"
+        statuses = [one for one in self._recorded.of(TASK_STATUS) if one.goal_id == end.goal_id]
+        derived = interrupted(statuses[0], "interrupted", RESTART, tick) if statuses else None
+        if derived is not None:
+            self._results.compare_messages(where, end, derived)
+        else:
+            self._results.surplus(where, "a result; no action was under way", end.seq)
+
     def _go_on(self, trial: MotionTrial, said: RobotState) -> None:
-        if said.source != self._said[0].source:
-            raise _Lost(f"not derived from tick {said.tick} on: another motion had taken over")
         self._end_by_others(trial, before_ns=said.stamp_ns)
+        # Told before this state: it was put while the holds of the state before stood.
+        while self._asked and self._asked[0].stamp_ns < said.stamp_ns and trial.goal is None:
+            self._ask_next(trial)
         action = said.action
-        if action is not None and action.goal_id != self._latest_goal:
+        if action is not None and action.goal_id not in self._put_before:
             self._start(trial, action.goal_id)
         self._impose(trial, said)
         if said.tick == trial.tick + 1:
@@ -142,7 +191,7 @@ class _Audit:
 
     def _start(self, trial: MotionTrial, goal_id: str) -> None:
         """Put the recorded goals to motion, up to the one that a state shows."""
-        while self._latest_goal != goal_id:
+        while goal_id not in self._put_before:
             if not self._asked:
                 raise _Lost(f"not derived from goal {goal_id} on: the log lacks its request")
             self._ask_next(trial)
@@ -153,12 +202,21 @@ class _Audit:
             self._end_by_others(trial)
         mirror = self._asked.popleft()
         request, reply = request_of(EXECUTE, mirror), reply_of(EXECUTE, mirror)
+        if request == self._accepted:
+            # Asked again because the answer was lost.
+            answer = ExecuteReply(accepted=True, reason="")
+            self._goals.compare(f"goal {request.goal_id} again", reply, answer, mirror.seq)
+            return
+        if reply.reason != RESTART and RESTART in self._holds.current():
+            # Lifted meanwhile; the next state shows it.
+            self._holds.resume(RESTART, by=RESTART)
         if reply.reason == "another_trial" and self._recorded.mirrors(CANCEL):
             trial.cancel("as recorded")
         self._put(trial, mirror, request, reply)
         if reply.accepted:
-            self._latest_goal = request.goal_id
-            while self._asked and reply_of(EXECUTE, self._asked[0]).reason == BUSY:
+            self._latest_goal, self._accepted = request.goal_id, request
+            self._put_before.add(request.goal_id)
+            while self._asked and reply_of(EXECUTE, self._asked[0]).reason in MEANWHILE:
                 late = self._asked.popleft()
                 self._put(trial, late, request_of(EXECUTE, late), reply_of(EXECUTE, late))
 

@@ -1,6 +1,8 @@
 """The planner again: each plan from its context, each answer to why not, each step of the loop."""
 
 import time
+from collections.abc import Mapping
+from pathlib import Path
 
 import msgspec
 
@@ -12,9 +14,10 @@ from fras_audit.recorded import Recorded, reply_of, request_of
 from fras_common.errors import FrasError
 from fras_common.messages import Context, Plan, RpcRecord
 from fras_common.topics import CONTEXT, PLAN, WHY_NOT
+from fras_log.attachments import rules_in
 from fras_planner.adapter import PlanMaker
-from fras_planner.executive import PlanRequest
-from fras_planner.knowledge import load_knowledge
+from fras_planner.knowledge import attached_knowledge, load_knowledge
+from fras_planner.memory import PlanRequest
 from fras_planner.planning import Knowledge
 
 # A search that the clock ended, or the number of conflicts allowed, says so in its core.
@@ -29,13 +32,40 @@ def audit(recorded: Recorded, progress: Progress) -> list[Tally]:
     Returns
     -------
     list of Tally
-        Plans, answers, questions, statuses.
+        Rules where the log names them, plans, answers, questions, statuses.
+
+    Raises
+    ------
+    BadAttachment, AttachedRulesUnusable
     """
-    knowledge = load_knowledge()
+    knowledge, attached = rules_of(recorded)
+    named = recorded.metadata.get("asp_digest", "")
+    tallies: list[Tally] = []
+    if attached or named:
+        rules = Tally("planner", "rules", 1)
+        rules.compare("the opening record", named, knowledge.digest)
+        if not attached:
+            rules.notes.append("the log names them and does not hold them: this machine's serve")
+        tallies.append(rules)
+    sent: Mapping[str, str] = knowledge.files if tallies else {}
     return [
-        *audit_plans(recorded, knowledge, progress),
-        *audit_executive(recorded, knowledge),
+        *tallies,
+        *audit_plans(recorded, knowledge, progress, attached=attached),
+        *audit_executive(recorded, knowledge, sent),
     ]
+
+
+def rules_of(recorded: Recorded) -> tuple[Knowledge, bool]:
+    """Return the rules attached to a log and True, else those of this machine.
+
+    Raises
+    ------
+    BadAttachment, AttachedRulesUnusable
+    """
+    rules = rules_in(recorded.attachments, Path(recorded.path))
+    if rules:
+        return attached_knowledge(rules, recorded.path), True
+    return load_knowledge(), False
 
 
 def maker_of(recorded: Recorded, knowledge: Knowledge) -> PlanMaker:
@@ -53,17 +83,9 @@ def context_of(recorded: Recorded, plan: Plan) -> Context | None:
     return None
 
 
-def request_for(plan: Plan) -> PlanRequest:
-    """Return what else a plan was made from."""
-    return PlanRequest(
-        request_id=plan.request_id,
-        reason=plan.reason,
-        ignore_ap=plan.ignore_ap,
-        tried=tuple(plan.tried),
-    )
-
-
-def audit_plans(recorded: Recorded, knowledge: Knowledge, progress: Progress) -> list[Tally]:
+def audit_plans(
+    recorded: Recorded, knowledge: Knowledge, progress: Progress, *, attached: bool
+) -> list[Tally]:
     """Derive plans and answers, in the order in which one solver gave them.
 
     That order counts: what the solver learnt from one question stays for the next.
@@ -72,11 +94,16 @@ def audit_plans(recorded: Recorded, knowledge: Knowledge, progress: Progress) ->
     questions = [one for one in recorded.mirrors(WHY_NOT) if one.fault is None]
     plans = Tally("planner", "plans", len(recorded.of(PLAN)), tolerance)
     answers = Tally("planner", "answers to why not", len(questions), tolerance)
-    _note_other_rules(recorded, knowledge, plans)
+    _note_other_rules(recorded, knowledge, plans, attached=attached)
     maker = maker_of(recorded, knowledge)
     said = sorted([*recorded.of(PLAN), *questions], key=lambda one: one.stamp_ns)
+    before: Plan | None = None
     for number, one in enumerate(said, start=1):
+        if number > 1 and one.source != said[number - 2].source:
+            plans.notes.append(f"another planner took over: {one.source}")
+            maker = _successor(recorded, knowledge, before)
         if isinstance(one, Plan):
+            before = one
             _audit_plan(one, maker, recorded, plans)
         else:
             _audit_answer(one, maker, answers)
@@ -84,14 +111,29 @@ def audit_plans(recorded: Recorded, knowledge: Knowledge, progress: Progress) ->
     return [plans, answers]
 
 
-def _note_other_rules(recorded: Recorded, knowledge: Knowledge, plans: Tally) -> None:
+def _successor(recorded: Recorded, knowledge: Knowledge, before: Plan | None) -> PlanMaker:
+    """Make the planner of a process that took over: it knows the last plan, and nothing else."""
+    maker = maker_of(recorded, knowledge)
+    context = context_of(recorded, before) if before is not None else None
+    if before is not None and context is not None:
+        maker.recall(before, context)
+    return maker
+
+
+def _note_other_rules(
+    recorded: Recorded, knowledge: Knowledge, plans: Tally, *, attached: bool
+) -> None:
     others = sorted({one.asp_digest for one in recorded.of(PLAN)} - {knowledge.digest})
-    if others:
-        named = ", ".join(digest[:12] for digest in others)
-        plans.notes.append(
-            f"planned by other rules (digest {named}) than those at hand "
-            f"({knowledge.digest[:12]}): --asp-dir compares decisions"
-        )
+    if not others:
+        return
+    named = ", ".join(digest[:12] for digest in others)
+    ours = (
+        f"those attached to the log ({knowledge.digest[:12]})"
+        if attached
+        else f"this machine's ({knowledge.digest[:12]}), and the log attaches none: --asp-dir "
+        "compares decisions"
+    )
+    plans.notes.append(f"planned by other rules (digest {named}) than {ours}")
 
 
 def _audit_plan(plan: Plan, maker: PlanMaker, recorded: Recorded, plans: Tally) -> None:
@@ -104,7 +146,7 @@ def _audit_plan(plan: Plan, maker: PlanMaker, recorded: Recorded, plans: Tally) 
         plans.notes.append(f"{where}: the time allowed was over, which no audit can derive")
         return
     try:
-        derived = maker(context, request_for(plan))
+        derived = maker(context, PlanRequest.of(plan))
     except FrasError as error:
         plans.surplus(where, f"a plan; refused again: {error}", plan.seq)
         return

@@ -6,6 +6,7 @@ from pathlib import Path
 from fras_audit.recorded import Recorded, gather
 from fras_log import LogReader
 from fras_log.about import refuse_newer, scenario_of, trial_of
+from fras_log.attachments import read_attachments
 
 
 def read_recorded(path: Path) -> Recorded:
@@ -25,6 +26,7 @@ def read_recorded(path: Path) -> Recorded:
     trial = trial_of(reader)
     refuse_newer(reader)
     recorded = Recorded(str(path), trial, dict(reader.metadata), scenario_of(reader))
+    recorded.attachments = read_attachments(path)
     gather(chain(first, messages), recorded)
     recorded.damage = reader.damage
     return recorded

@@ -27,6 +27,7 @@ READ: tuple[Topic[Any], ...] = (
     t.TASK_STATUS,
     t.ACTION_RESULT,
     t.HOLDS,
+    t.PRESENCE,
     t.RECORDER_STATUS,
 )
 _READ = {topic.key: topic for topic in READ}
@@ -56,6 +57,8 @@ class Recorded:
         By key, how many messages are missing by their numbers.
     arms_by : str
         Who drives the arms: `motion`, or the other process that does.
+    attachments : mapping of str to bytes
+        Files that belong to the trial, by name.
     """
 
     path: str
@@ -66,6 +69,7 @@ class Recorded:
     malformed: int = 0
     gaps: dict[str, int] = field(default_factory=dict[str, int])
     arms_by: str = "motion"
+    attachments: Mapping[str, bytes] = field(default_factory=dict[str, bytes])
     _messages: dict[str, list[Any]] = field(default_factory=lambda: defaultdict(list))
     _mirrors: dict[str, list[m.RpcRecord]] = field(default_factory=lambda: defaultdict(list))
     _facts: dict[str, Mapping[str, str]] = field(default_factory=dict[str, Mapping[str, str]])
@@ -114,11 +118,12 @@ class Recorded:
         if header is None:
             self.malformed += 1
             return
-        self._note_gap(key, header.source, header.seq)
+        if not t.may_be_lost(key):
+            self._note_gap(key, header.source, header.seq)
         if key == _DRIVER_KEY:
             self.arms_by = header.source.partition("/")[0]
-        elif header.trial == self.trial or key == t.HOLDS.key:
-            # Holds are of no trial: they outlive each.
+        elif header.trial == self.trial or key in {t.HOLDS.key, t.PRESENCE.key}:
+            # Holds are of no trial: they outlive each. So is who looks at a page.
             self._keep(message)
 
     def _keep(self, message: RawMessage) -> None:

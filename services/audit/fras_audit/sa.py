@@ -51,7 +51,7 @@ class _Audit:
         self._told = by_tick(recorded.of(CONTEXT))
         # A context in the mirror is numbered like the one published.
         self._answers = {
-            answer.seq: (request_of(SA_CONTEXT, mirror), answer)
+            (answer.source, answer.seq): (request_of(SA_CONTEXT, mirror), answer)
             for mirror in recorded.mirrors(SA_CONTEXT)
             if mirror.fault is None
             for answer in [reply_of(SA_CONTEXT, mirror)]
@@ -105,10 +105,10 @@ class _Audit:
     def _tell(self, watched: WatchedTrial, tick: int) -> None:
         for told in self._told.get(tick, []):
             where = f"context {told.request_id} at tick {tick}"
-            if told.seq not in self._answers:
+            if (told.source, told.seq) not in self._answers:
                 self._contexts.notes.append(f"{where}: its question is not in the log")
                 continue
-            request, answer = self._answers[told.seq]
+            request, answer = self._answers[told.source, told.seq]
             try:
                 derived = watched.context(request)
             except FrasError as error:

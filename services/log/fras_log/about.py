@@ -37,7 +37,7 @@ def scenario_of(reader: LogReader) -> Scenario:
         raise ForeignLog(reader.path, "its metadata record `fras` lacks the scenario")
     try:
         raw = tomllib.loads(reader.metadata["scenario"])
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:
         raise ForeignLog(reader.path, f"its recorded scenario is no TOML: {error}") from error
     return convert(raw, f"{reader.path}, recorded scenario")
 
@@ -56,5 +56,5 @@ def refuse_newer(reader: LogReader) -> None:
 
 def _numbers(version_text: str) -> tuple[int, ...]:
     """Return the release's numbers; none for a text that does not begin with one."""
-    release = re.match(r"\d+(\.\d+)*", version_text)
+    release = re.match(r"\d{1,9}(\.\d{1,9})*", version_text)
     return tuple(int(number) for number in release[0].split(".")) if release else ()

@@ -2,7 +2,10 @@
 
 import functools
 import hashlib
+from collections.abc import Mapping
 from dataclasses import dataclass
+
+from mcap.records import Channel, Schema
 
 
 @dataclass(frozen=True)
@@ -43,3 +46,19 @@ class Definition:
     def encoding(self) -> str:
         """How its payloads travelled."""
         return dict(self.metadata).get("zenoh_encoding", "")
+
+
+def definition_of(channel: Channel, schemas: Mapping[int, Schema]) -> Definition:
+    """Return what a channel's record and that of its schema say."""
+    metadata = tuple(channel.metadata.items())
+    schema = schemas.get(channel.schema_id)
+    if schema is None:
+        return Definition(channel.topic, channel.message_encoding, metadata)
+    return Definition(
+        channel.topic,
+        channel.message_encoding,
+        metadata,
+        schema.name,
+        schema.encoding,
+        schema.data,
+    )

@@ -14,8 +14,8 @@ _HEAD = struct.Struct("<QQQII")
 _SIZE = struct.Struct("<Q")
 _MESSAGE = struct.Struct("<HIQQ")
 _ENTRY = struct.Struct("<QQ")
-# The recorder's chunks are of 1 MiB and one message; a larger one is a damaged length.
-_MOST_BYTES = 2**30
+# The recorder's chunks are of 1 MiB and one message; a larger one is a damaged length, or a bomb.
+MOST_BYTES = 2**28
 
 
 class BadChunk(ValueError):
@@ -88,7 +88,10 @@ class Chunk:
                 payload = data[start + _MESSAGE.size : end]
                 yield opcode, number, sequence, log_time, publish_time, payload
             position = end
-        if self.entries and (first, last) != (self.start_time, self.end_time):
+        if not self.entries:
+            # Its times would count all the same, as those of the log.
+            raise BadChunk("there are no messages in this chunk", framed=True)
+        if (first, last) != (self.start_time, self.end_time):
             raise BadChunk("this chunk lies about when its messages arrived", framed=True)
 
 
@@ -118,14 +121,17 @@ def open_chunk(content: bytes) -> Chunk:
 
 def _decompress(body: memoryview, compression: str, size: int) -> bytes:
     if compression == "":
+        if len(body) != size:
+            raise BadChunk("this chunk lies about its size", framed=True)
         return bytes(body)
     if compression != "zstd":
         text = f"a chunk compressed with {compression!r}, which no recorder does"
         raise BadChunk(text, framed=True)
     try:
         # The content's own size first: a damaged one would take all memory.
-        if zstandard.frame_content_size(body) != size or size > _MOST_BYTES:
+        if zstandard.frame_content_size(body) != size or size > MOST_BYTES:
             raise BadChunk("this chunk lies about its size", framed=True)
-        return zstandard.decompress(body)
+        # Bytes behind the frame would be none to this reader, and some to others.
+        return zstandard.ZstdDecompressor().decompress(body, allow_extra_data=False)
     except (zstandard.ZstdError, MemoryError) as error:
         raise BadChunk(f"this chunk can't be decompressed: {error}", framed=True) from error

@@ -2,14 +2,20 @@
 
 import re
 from collections import Counter
+from functools import cache
 from importlib.metadata import version
 from typing import Any, NamedTuple
 
 from fras_common.codec import HeaderFields, MalformedMessage, decode, read_header
 from fras_common.messages import Header, RobotState, Verdict
-from fras_common.topics import ROBOT_STATE, VERDICT, Qos, Topic, topic_of
+from fras_common.topics import ROBOT_STATE, VERDICT, Topic, may_be_lost, topic_of
 from fras_log.events import Recorded
 from fras_log.findings import Finding, Verification
+
+
+@cache
+def _own_version() -> str:
+    return version("fras")
 
 
 class _Move(NamedTuple):
@@ -21,6 +27,7 @@ class _Move(NamedTuple):
     offset: int
     topic: str
     sequence: int
+    file: str
 
 
 class Content:
@@ -37,7 +44,8 @@ class Content:
         self._topics: dict[str, Topic[Any] | None] = {}
         self._next: dict[tuple[str, str], int] = {}
         self._verdicts: set[tuple[str, int]] = set()
-        self._moves: list[_Move] = []
+        # Of which the verdict was not there yet; one of many that say the same.
+        self._moves: dict[tuple[str, int, int], _Move] = {}
         self._whole = True
         self._newer = ""
         self._opening_offset = -1
@@ -46,7 +54,7 @@ class Content:
     def open(self, offset: int, opening: dict[str, str]) -> None:
         """Note who wrote the log."""
         written = opening.get("fras_version", "")
-        if _release(written) > _release(version("fras")):
+        if _release(written) > _release(_own_version()):
             self._newer, self._opening_offset = written, offset
 
     def take(self, message: Recorded) -> int:
@@ -63,21 +71,12 @@ class Content:
         header = decoded if decoded is not None else read_header(message.payload)
         if header is None:
             return -1
-        if topic is None or topic.qos is not Qos.TELEMETRY:
+        if not may_be_lost(key):
             self._count(message, header)
         if topic is VERDICT and isinstance(decoded, Verdict):
             self._verdicts.add((decoded.trial, decoded.tick))
         elif topic is ROBOT_STATE and isinstance(decoded, RobotState):
-            self._moves.append(
-                _Move(
-                    decoded.trial,
-                    decoded.tick,
-                    decoded.verdict_tick,
-                    message.offset,
-                    key,
-                    message.sequence,
-                )
-            )
+            self._note_move(decoded, message)
         return header.tick
 
     def lose(self) -> None:
@@ -90,16 +89,29 @@ class Content:
         if self._newer:
             self._tell_version()
         # Keys have no order between them: a verdict may stand behind what was done on it.
-        for move in self._moves:
-            if move.tick <= 0:
-                continue
+        for move in self._moves.values():
             judged = not self._whole or (move.trial, move.tick - 1) in self._verdicts
             if not judged or move.verdict_tick != move.tick - 1:
                 text = f"the arms moved on verdict {move.verdict_tick}"
                 text += "" if judged else f", and there is none for tick {move.tick - 1}"
-                self._found.add(
-                    Finding("interlock", text, move.offset, move.topic, move.sequence, move.tick)
-                )
+                place = (move.offset, move.topic, move.sequence, move.tick, move.file)
+                self._found.add(Finding("interlock", text, *place))
+
+    def _note_move(self, state: RobotState, message: Recorded) -> None:
+        before = state.tick - 1
+        on_it = state.verdict_tick == before and (state.trial, before) in self._verdicts
+        name = (state.trial, state.tick, state.verdict_tick)
+        if before < 0 or on_it or name in self._moves:
+            return
+        self._moves[name] = _Move(
+            state.trial,
+            state.tick,
+            state.verdict_tick,
+            message.offset,
+            message.topic,
+            message.sequence,
+            self._found.file,
+        )
 
     def _decode(self, topic: Topic[Any], message: Recorded) -> Any:
         try:

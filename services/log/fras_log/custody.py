@@ -19,6 +19,9 @@ from fras_log.findings import Finding, Verification
 from fras_log.keys import PublicKey
 from fras_log.names import BESIDE, CHECKPOINT, CLOSED, METADATA, PROFILE
 
+MOST_OF_A_STRETCH = 200_000
+"""Messages between two checkpoints; a recorder writes one at the latest after 16,384."""
+
 
 class _Place(NamedTuple):
     """A message of the stretch under way, without its payload."""
@@ -33,21 +36,49 @@ class _Place(NamedTuple):
         return Finding("chain", text, self.offset, self.topic, self.sequence, self.tick)
 
 
+class GoesOn(NamedTuple):
+    """Where the file behind one says that it goes on."""
+
+    file: str
+    messages: int
+    head: str
+
+
 class Custody:
-    """Follows the chain of a log.
+    """Follows the chain of a file.
 
     Parameters
     ----------
     found : Verification
-        Where to put what is found.
+        Where to put what is wrong.
     trusted : sequence of PublicKey
+
+    Attributes
+    ----------
+    opening : dict of str to str or None
+        What the file says of itself.
+    closing : dict of str to str or None
+        How it was finished.
+    messages, chained : int
+        How many there are, and how many of them, from the first, the chain vouches for.
+    head : str
+        Of the chain after the last message, hexadecimal; known at the end.
+    signed_by : str
+        Fingerprint of the key of the signatures, if all of them are its; else empty.
+    trusted : bool
+        Whether it is one that the reader trusts.
     """
 
     def __init__(self, found: Verification, trusted: Sequence[PublicKey]) -> None:
+        self.opening: dict[str, str] | None = None
         self.closing: dict[str, str] | None = None
-        self.opened = False
+        self.messages = 0
+        self.chained = 0
+        self.head = ""
+        self.signed_by = ""
+        self.trusted = False
         self._found = found
-        self._trusted = trusted
+        self._trusted_keys = trusted
         self._attachments: dict[str, bytes] = {}
         self._beside: dict[str, str] = {}
         self._key: PublicKey | None = None
@@ -94,32 +125,64 @@ class Custody:
 
     def take_message(self, message: Recorded, tick: int) -> None:
         """Take a message."""
+        self.messages += 1
         offset, channel, log_time, publish_time, sequence, payload = message
         one = leaf(channel.digest, log_time, publish_time, sequence, payload)
         self._stretch.append(_Place(one, offset, channel.topic, sequence, tick))
+        if len(self._stretch) >= MOST_OF_A_STRETCH:
+            self._give_up_stretch()
+
+    def _give_up_stretch(self) -> None:
+        """Keep the head of what no checkpoint ends, and not each message of it."""
+        stretch, self._stretch = self._stretch, []
+        text = f"{len(stretch)} messages from here on without a checkpoint: no recorder does that"
+        self._found.add(stretch[0].finding(text))
+        self._heads = self._heads_after(stretch)
+        self._counts = tuple(count + len(stretch) for count in self._counts)
+        self._unbroken = False
 
     def lose(self) -> None:
         """Note that messages may be missing here."""
         self._lost_stretch = True
 
-    def finish(self, head: str) -> None:
-        """Say what the whole comes to; `head` as it was noted elsewhere, or empty."""
-        found = self._found
-        if not self.opened:
+    def finish(self, goes_on: GoesOn | None = None) -> bool:
+        """Say what the file comes to.
+
+        Parameters
+        ----------
+        goes_on : GoesOn, optional
+            What the next file says of the end of this one.
+
+        Returns
+        -------
+        bool
+            Whether the next file vouches for this end, however it came.
+        """
+        found, stretch = self._found, self._stretch
+        if self.opening is None:
             found.add(Finding("structure", f"the record {METADATA!r} is missing"))
-        if self._stretch:
-            text = f"{len(self._stretch)} messages from here on that no checkpoint vouches for"
-            found.add(self._stretch[0].finding(text))
-            self._heads = self._heads_after(self._stretch)
-        if self.closing is None and self._beside:
-            found.add(Finding("structure", f"no closing record vouches for {list(self._beside)}"))
-        found.head = (self._heads or self._first())[0].hex()
-        if head and head != found.head:
-            text = f"the head is {found.head}, not the one that was noted"
+        if stretch:
+            self._heads = self._heads_after(stretch)
+        self.head = (self._heads or self._first())[0].hex()
+        vouched = goes_on is not None and goes_on[1:] == (self.messages, self.head)
+        if vouched:
+            self.chained += len(stretch) if self._unbroken else 0
+        elif stretch:
+            text = f"{len(stretch)} messages from here on that no checkpoint vouches for"
+            found.add(stretch[0].finding(text))
+        if goes_on is not None and not vouched:
+            text = (
+                f"{goes_on.file} goes on after {goes_on.messages} messages and head "
+                f"{goes_on.head}; here are {self.messages}, and the head is {self.head}"
+            )
             found.add(Finding("chain", text))
-        if self._key is not None and self._signed and found.chained == found.messages:
-            found.signed_by = self._key.fingerprint
-            found.trusted = self._key in self._trusted
+        if self.closing is None and self._beside:
+            # The next file vouches for messages alone.
+            found.add(Finding("structure", f"no closing record vouches for {list(self._beside)}"))
+        if self._key is not None and self._signed and self.chained == self.messages:
+            self.signed_by = self._key.fingerprint
+            self.trusted = self._key in self._trusted_keys
+        return vouched
 
     # --- records --------------------------------------------------------------------------
 
@@ -127,11 +190,10 @@ class Custody:
         self._found.add(Finding("structure", text, offset))
 
     def _take_opening(self, told: Told) -> None:
-        if self.opened or self._heads or self._stretch:
+        if self.opening is not None or self._heads or self._stretch:
             self._misplaced(told.offset, f"a second record {METADATA!r}, or one after messages")
             return
-        self.opened = True
-        self._found.opening = told.content
+        self.opening = told.content
         if raw := told.content.get("public_key", ""):
             try:
                 self._key = PublicKey(bytes.fromhex(raw))
@@ -158,7 +220,7 @@ class Custody:
         if checkpoint.head in heads and checkpoint.messages in counts:
             self._heads, self._counts = (checkpoint.head,), (checkpoint.messages,)
             if self._unbroken:
-                self._found.chained += len(stretch)
+                self.chained += len(stretch)
             if len(stretch) != len(checkpoint.leaves):
                 for finding in self._explain(told, checkpoint, stretch, is_first=is_first):
                     self._found.add(finding)
@@ -185,10 +247,10 @@ class Custody:
         if content.get("head") not in heads:
             text = f"the closing record has another head than the messages, {heads[0]}"
             self._found.add(Finding("chain", text, told.offset))
-        if content.get("messages") != str(self._found.messages):
+        if content.get("messages") != str(self.messages):
             text = (
                 f"the closing record counts {content.get('messages')} messages, there are "
-                f"{self._found.messages}"
+                f"{self.messages}"
             )
             self._found.add(Finding("chain", text, told.offset))
         vouched = {
@@ -212,7 +274,7 @@ class Custody:
     # --- the chain ------------------------------------------------------------------------
 
     def _first(self) -> tuple[bytes, ...]:
-        return (first_head(self._found.opening, self._attachments),)
+        return (first_head(self.opening or {}, self._attachments),)
 
     def _heads_after(self, stretch: Iterable[_Place]) -> tuple[bytes, ...]:
         heads: list[bytes] = []

@@ -52,3 +52,7 @@ class NewerLog(FrasError):
 
 class LogExists(FrasError):
     """A log is never written over."""
+
+
+class NotAManifest(FrasError):
+    """A file that should tell of a log's parts does not."""

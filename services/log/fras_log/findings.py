@@ -1,7 +1,7 @@
 """What verification found."""
 
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 # After so many of a kind the rest is counted only.
 MOST_OF_A_KIND = 20
@@ -14,7 +14,8 @@ class Finding:
     Attributes
     ----------
     kind : str
-        `structure` (bytes), `end` (the file ends too early), `chain` (a message that was changed,
+        `structure` (bytes), `end` (the file ends too early), `parts` (a file of the log is missing,
+        or another one), `chain` (a message that was changed,
         moved, added or left out), `signature`, `version` (a newer FRAS wrote it), `sequence`
         (messages that never arrived), `schema` (a payload that does not fit its key), `interlock`
         (the arms moved without a verdict).
@@ -24,6 +25,8 @@ class Finding:
         Where in the file; -1 where that has no place.
     topic, sequence, tick
         Of the message, if it is one; "" and -1 else.
+    file : str
+        In which file of a log that has several; else empty.
     """
 
     kind: str
@@ -32,9 +35,11 @@ class Finding:
     topic: str = ""
     sequence: int = -1
     tick: int = -1
+    file: str = ""
 
     def __str__(self) -> str:
-        place = [f"offset {self.offset}"] if self.offset >= 0 else []
+        place = [self.file] if self.file else []
+        place += [f"offset {self.offset}"] if self.offset >= 0 else []
         if self.topic:
             place += [self.topic, f"number {self.sequence}", f"tick {self.tick}"]
         return f"{self.kind}: {self.text}" + (f" ({', '.join(place)})" if place else "")
@@ -58,6 +63,12 @@ class Verification:
         Whether the recorder finished the file.
     opening : dict of str to str
         What the log says of itself.
+    parts : int
+        How many files it has.
+    unfinished : list of str
+        Those whose recorder never finished them, so that the next one vouches for their end.
+    file : str
+        What is added is of this file; empty if there is one alone.
     """
 
     messages: int = 0
@@ -67,6 +78,9 @@ class Verification:
     trusted: bool = False
     closed: bool = False
     opening: dict[str, str] = field(default_factory=dict[str, str])
+    parts: int = 1
+    unfinished: list[str] = field(default_factory=list[str])
+    file: str = ""
     findings: list[Finding] = field(default_factory=list[Finding])
     beyond: Counter[str] = field(default_factory=Counter[str])
     _of_a_kind: Counter[str] = field(default_factory=Counter[str])
@@ -87,6 +101,8 @@ class Verification:
 
     def add(self, finding: Finding) -> None:
         """Note something wrong."""
+        if not finding.file:
+            finding = replace(finding, file=self.file)
         self._of_a_kind[finding.kind] += 1
         if self._of_a_kind[finding.kind] <= MOST_OF_A_KIND:
             self.findings.append(finding)

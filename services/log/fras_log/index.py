@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from mcap.opcode import Opcode
 from mcap.records import (
+    Attachment,
     AttachmentIndex,
     Channel,
     ChunkIndex,
@@ -18,6 +18,7 @@ from mcap.records import (
 
 from fras_log.chunks import Chunk
 from fras_log.events import Broken
+from fras_log.summary import Pointer, Summary
 
 _MESSAGE_INDEX = struct.Struct("<HI")
 _ENTRY_BYTES = 16
@@ -36,20 +37,12 @@ class Index:
     schemas: dict[int, Schema] = field(default_factory=dict[int, Schema])
     channels: dict[int, Channel] = field(default_factory=dict[int, Channel])
     _chunks: dict[int, ChunkIndex] = field(default_factory=dict[int, ChunkIndex])
-    _pointers: set[tuple[Opcode, int, int, str]] = field(
-        default_factory=set[tuple[Opcode, int, int, str]]
-    )
+    _pointers: dict[int, Pointer] = field(default_factory=dict[int, Pointer])
     _counts: Counter[int] = field(default_factory=Counter[int])
     _open: ChunkIndex | None = None
     _lost: bool = False
     _entries: dict[int, bytes] = field(default_factory=dict[int, bytes])
-    _told_schemas: dict[int, Schema] = field(default_factory=dict[int, Schema])
-    _told_channels: dict[int, Channel] = field(default_factory=dict[int, Channel])
-    _told_chunks: dict[int, ChunkIndex] = field(default_factory=dict[int, ChunkIndex])
-    _told_pointers: set[tuple[Opcode, int, int, str]] = field(
-        default_factory=set[tuple[Opcode, int, int, str]]
-    )
-    _told_statistics: Statistics | None = None
+    _summary: Summary = field(default_factory=Summary)
 
     # --- the data -------------------------------------------------------------------------
 
@@ -89,7 +82,7 @@ class Index:
         told = content[_MESSAGE_INDEX.size :]
         if self._lost:
             return ""
-        if self._open is None or len(told) != size or self._entries.pop(number, b"") != told:
+        if self._open is None or len(told) != size or self._entries.pop(number, None) != told:
             return wrong
         self._open.message_index_offsets[number] = offset
         self._open.message_index_length += length
@@ -104,61 +97,71 @@ class Index:
         """Note damage here: what indexes a lost chunk can't be held against it."""
         self._entries, self._open, self._lost = {}, None, True
 
-    def point(self, opcode: Opcode, offset: int, length: int, name: str) -> None:
-        """Take an attachment or a metadata record of the data."""
-        self._pointers.add((opcode, offset, length, name))
+    def point(self, pointer: Pointer) -> None:
+        """Take what the index has to say of a record of the data."""
+        self._pointers[pointer.offset] = pointer
+
+    def attach(self, offset: int, length: int, record: Attachment) -> None:
+        """Take an attachment of the data."""
+        self.point(
+            AttachmentIndex(
+                offset=offset,
+                length=length,
+                create_time=record.create_time,
+                log_time=record.log_time,
+                data_size=len(record.data),
+                name=record.name,
+                media_type=record.media_type,
+            )
+        )
 
     # --- the end --------------------------------------------------------------------------
 
-    def told(self, record: Any) -> None:
+    def told(self, offset: int, length: int, record: Any) -> None:
         """Take a record of the index."""
-        match record:
-            case Schema():
-                self._told_schemas[record.id] = record
-            case Channel():
-                self._told_channels[record.id] = record
-            case ChunkIndex():
-                self._told_chunks[record.chunk_start_offset] = record
-            case AttachmentIndex(offset=offset, length=length, name=name):
-                self._told_pointers.add((Opcode.ATTACHMENT, offset, length, name))
-            case MetadataIndex(offset=offset, length=length, name=name):
-                self._told_pointers.add((Opcode.METADATA, offset, length, name))
-            case Statistics():
-                self._told_statistics = record
-            case _:
-                pass
+        self._summary.take(offset, length, record)
 
-    def problems(self, offset: int) -> Iterator[Broken]:
-        """Say what the index at `offset` tells that is not so."""
+    def problems(self, offset: int, groups_start: int) -> Iterator[Broken]:
+        """Say what the index at `offset` tells that is not so; `groups_start` is the footer's."""
+        summary = self._summary
         pairs = {
-            "chunks": (self._chunks, self._told_chunks),
-            "schemas": (self.schemas, self._told_schemas),
-            "channels": (self.channels, self._told_channels),
-            "attachments and metadata": (self._pointers, self._told_pointers),
+            "chunks": (self._chunks, summary.chunks),
+            "schemas": (self.schemas, summary.schemas),
+            "channels": (self.channels, summary.channels),
+            "attachments and metadata": (self._pointers, summary.pointers),
         }
-        for what, (found, told) in pairs.items():
-            if found != told:
+        for what, (found, said) in pairs.items():
+            if found != said:
                 text = f"the index and the data differ in their {what}"
                 yield Broken(offset, text, loses=False)
-        if self._told_statistics != self._statistics():
-            told_count = self._told_statistics.message_count if self._told_statistics else 0
+        statistics = summary.statistics.get(0)
+        if statistics != self._statistics():
             text = (
-                f"the index counts {told_count} messages of which there are "
-                f"{self._counts.total()}, or lies about their times"
+                f"the index counts {statistics.message_count if statistics else 0} messages of "
+                f"which there are {self._counts.total()}, or lies about their times"
             )
             yield Broken(offset, text, loses=False)
+        for text in summary.problems(groups_start):
+            yield Broken(offset, text, loses=False)
+        if unused := self._unused():
+            text = f"{unused} keys or schemas are defined of no message: no recorder does that"
+            yield Broken(offset, text, loses=False)
+
+    def _unused(self) -> int:
+        schemas = {one.schema_id for one in self.channels.values()}
+        return len(self.channels.keys() - self._counts.keys()) + len(self.schemas.keys() - schemas)
 
     def _statistics(self) -> Statistics:
         chunks = self._chunks.values()
-        kinds = Counter(opcode for opcode, *_ in self._pointers)
+        kinds = Counter(type(one) for one in self._pointers.values())
         return Statistics(
-            attachment_count=kinds[Opcode.ATTACHMENT],
+            attachment_count=kinds[AttachmentIndex],
             channel_count=len(self.channels),
             channel_message_counts=dict(self._counts),
             chunk_count=len(self._chunks),
             message_count=self._counts.total(),
             message_end_time=max((one.message_end_time for one in chunks), default=0),
             message_start_time=min((one.message_start_time for one in chunks), default=0),
-            metadata_count=kinds[Opcode.METADATA],
+            metadata_count=kinds[MetadataIndex],
             schema_count=len(self.schemas),
         )

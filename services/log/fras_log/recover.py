@@ -9,7 +9,9 @@ from fras_common.codec import read_header
 from fras_log.errors import ForeignLog
 from fras_log.events import Attached, Began, Broken, Cut, Recorded, Told
 from fras_log.keys import Signer
-from fras_log.names import BESIDE, CHECKPOINT, CLOSED, METADATA, PROFILE, RECOVERED
+from fras_log.names import BESIDE, CHECKPOINT, CLOSED, METADATA, NEXT, PROFILE, RECOVERED
+from fras_log.parts import parts_of
+from fras_log.pieces import scan_log
 from fras_log.scan import Progress, scan
 from fras_log.verify import verify_file
 from fras_log.writer import LogFile
@@ -17,7 +19,7 @@ from fras_log.writer import LogFile
 __all__ = ["Recovery", "recover_file"]
 
 # What the new log's own closing record says itself.
-_OWN = ("head", "messages", "signature")
+_OWN = ("head", "messages", "signature", NEXT)
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,7 @@ def recover_file(
     Parameters
     ----------
     path : Path
-        The old log.
+        The old log, its first file.
     out : Path
         Must not exist.
     now_ns : int
@@ -79,6 +81,7 @@ def recover_file(
     ------
     NoSuchLog, NotAnMcap, ForeignLog, LogExists
     """
+    files = [file for file in parts_of(path) if file.is_file()]
     beginning = _read_beginning(path)
     chained = verify_file(path, progress=progress).chained
     described = {name: value for name, value in beginning.opening.items() if name != "public_key"}
@@ -86,7 +89,7 @@ def recover_file(
     damage: list[str] = []
     last_tick = -1
     closing: dict[str, str] = {"reason": "recovered"}
-    for event in scan(path, progress):
+    for event in scan_log(path, progress):
         match event:
             case Recorded():
                 log.append(*event[1:])
@@ -103,8 +106,8 @@ def recover_file(
     log.add_metadata(
         RECOVERED,
         {
-            "source": path.name,
-            "source_sha256": _sha256(path),
+            "source": ", ".join(file.name for file in files),
+            "source_sha256": ", ".join(_sha256(file) for file in files),
             "chained": str(chained),
             "opening": json.dumps(beginning.opening, sort_keys=True),
             "damage": "\n".join(damage),

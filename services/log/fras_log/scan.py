@@ -10,11 +10,9 @@ import struct
 import zlib
 from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import (
@@ -32,11 +30,13 @@ from mcap.records import (
     SummaryOffset,
 )
 
-from fras_log.channels import Definition
+from fras_log.channels import Definition, definition_of
 from fras_log.chunks import FRAME, BadChunk, open_chunk
 from fras_log.errors import NotAnMcap
 from fras_log.events import Attached, Began, Broken, Cut, Ended, Event, Recorded, Told
 from fras_log.index import Index
+from fras_log.names import MEDIA_TYPE
+from fras_log.records import Damaged, read_record
 from fras_log.source import Source, open_source
 
 __all__ = [
@@ -61,6 +61,8 @@ _FOOTER_TAIL = struct.Struct("<BQQQ")
 _KNOWN = frozenset(int(opcode) for opcode in Opcode)
 # A record larger than this is a damaged length.
 _MOST_BYTES = 2**31
+# Bytes that are tried as pieces, for each byte of the file: chance needs two, a forger all.
+_MOST_TRIED = 16
 # What stands where a piece begins from which to go on after damage: names with their lengths, in a
 # chunk after three numbers of 8 bytes and one of 4, in a record of our own at once.
 _PIECE = re.compile(rb"\x04\0\0\0zstd|\x0a\0\0\0fras\.chain|\x0b\0\0\0fras\.closed|\x04\0\0\0fras")
@@ -119,10 +121,6 @@ class _Frame:
         return self.end - self.offset
 
 
-class _Damaged(ValueError):
-    """A record that is not what it should be."""
-
-
 class _Scan:
     def __init__(self, source: Source, progress: Progress | None) -> None:
         self._source = source
@@ -135,6 +133,8 @@ class _Scan:
         self._spare_schemas: dict[int, Schema] = {}
         self._broken = False
         self._data_end: _Frame | None = None
+        self._false_ends = 0
+        self._tried = 0
 
     def events(self, position: int) -> Iterator[Event]:
         self._learn_from_summary()
@@ -174,24 +174,28 @@ class _Scan:
         return _Frame(position, opcode, start, start + length)
 
     def next_piece(self, position: int) -> int:
-        """Where the next piece begins that is whole; -1 if there is none."""
+        """Where the next piece begins that is whole, at `position` or behind; -1 if nowhere."""
+        least = max(position, len(MAGIC))
         while (found := self._source.find(_PIECE, position)) >= 0:
             position = found + 1
             for before in (_BEFORE_COMPRESSION, 0):
                 offset = found - before - FRAME.size
-                frame = self._frame(offset) if offset >= len(MAGIC) else None
+                frame = self._frame(offset) if offset >= least else None
                 if isinstance(frame, _Frame) and self._is_whole(frame):
                     return offset
+                if self._tried > _MOST_TRIED * self._size:
+                    return -1
         return -1
 
     def _is_whole(self, frame: _Frame) -> bool:
+        if frame.opcode not in (Opcode.CHUNK, Opcode.METADATA):
+            return False
+        self._tried += frame.length
         try:
             if frame.opcode == Opcode.CHUNK:
                 open_chunk(self._content(frame))
-            elif frame.opcode == Opcode.METADATA:
-                self._parse(frame, Metadata)
             else:
-                return False
+                self._parse(frame, Metadata)
         except _DAMAGE:
             return False
         return True
@@ -199,16 +203,11 @@ class _Scan:
     def _content(self, frame: _Frame) -> bytes:
         content = self._source.read(frame.start, frame.end)
         if len(content) != frame.end - frame.start:
-            raise _Damaged("the file was cut while it was read")
+            raise Damaged("the file was cut while it was read")
         return content
 
-    def _parse(self, frame: _Frame, kind: Any, after: int = 0) -> Any:
-        """Read a record that ends where its content does, but for `after` bytes."""
-        stream = ReadDataStream(BytesIO(self._content(frame)))
-        record = kind.read(stream)
-        if stream.count + after != frame.end - frame.start:
-            raise _Damaged("there is more in it than belongs there")
-        return record
+    def _parse(self, frame: _Frame, kind: Any) -> Any:
+        return read_record(kind, self._content(frame))
 
     def _note(self, event: Broken | Cut) -> Broken | Cut:
         self._broken = True
@@ -226,7 +225,7 @@ class _Scan:
             if error.framed:
                 return frame.end
         except _DAMAGE as error:
-            known = isinstance(error, _Damaged)
+            known = isinstance(error, Damaged)
             why = str(error) if known else f"{type(error).__name__}: {error}"
             yield self._note(Broken(frame.offset, f"a record that can't be read ({why})"))
         else:
@@ -239,21 +238,22 @@ class _Scan:
         if frame.opcode == Opcode.MESSAGE_INDEX:
             content = self._content(frame)
             if problem := self._index.message_index(frame.offset, frame.length, content):
-                raise _Damaged(problem)
+                raise Damaged(problem)
             return
         if missing := self._index.leave_chunk():
             yield self._note(Broken(frame.offset, missing))
         if self._data_end is not None:
             if frame.opcode not in _OF_THE_INDEX:
-                raise _Damaged("it stands after the end of the data")
-            self._index.told(self._parse(frame, _OF_THE_INDEX[frame.opcode]))
+                raise Damaged("it stands after the end of the data")
+            record = self._parse(frame, _OF_THE_INDEX[frame.opcode])
+            self._index.told(frame.offset, frame.length, record)
             return
         match frame.opcode:
             case Opcode.CHUNK:
                 yield from self._read_chunk(frame)
             case Opcode.METADATA:
                 record = self._parse(frame, Metadata)
-                self._index.point(Opcode.METADATA, frame.offset, frame.length, record.name)
+                self._index.point(MetadataIndex(frame.offset, frame.length, record.name))
                 yield Told(frame.offset, record.name, dict(record.metadata))
             case Opcode.ATTACHMENT:
                 yield self._read_attachment(frame)
@@ -261,10 +261,10 @@ class _Scan:
                 yield from self._read_data_end(frame)
             case Opcode.HEADER:
                 if frame.offset != len(MAGIC):
-                    raise _Damaged("a header that is not the file's first record")
+                    raise Damaged("a header that is not the file's first record")
                 yield Began(frame.offset, self._parse(frame, Header).profile)
             case _:
-                raise _Damaged(f"a record of kind {frame.opcode} where no recorder writes one")
+                raise Damaged(f"a record of kind {frame.opcode} where no recorder writes one")
 
     def _read_chunk(self, frame: _Frame) -> Iterator[Event]:
         # All of it or nothing: a chunk whose checksum is wrong is no evidence.
@@ -279,12 +279,19 @@ class _Scan:
                     yield Recorded(offset, channel, log_time, publish_time, sequence, payload)
             elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
                 kind = Schema if opcode == Opcode.SCHEMA else Channel
-                record = kind.read(ReadDataStream(BytesIO(payload)))
+                try:
+                    record = read_record(kind, payload)
+                except _DAMAGE as error:
+                    record = error.record if isinstance(error, Damaged) else None
+                    text = f"a {kind.__name__.lower()} in this chunk can't be read ({error})"
+                    if record is None:
+                        raise BadChunk(text, framed=True) from error
+                    yield self._note(Broken(offset, text, loses=False))
                 if problem := self._index.define(record):
                     yield self._note(Broken(offset, problem))
                 elif isinstance(record, Channel):
                     known = self._spare_schemas | self._index.schemas
-                    definitions[record.id] = _definition(record, known)
+                    definitions[record.id] = definition_of(record, known)
             else:
                 yield self._note(Broken(offset, f"a record of kind {opcode} in this chunk"))
         self._index.chunk(offset, frame.length, chunk)
@@ -299,7 +306,10 @@ class _Scan:
             return self._note(
                 Broken(frame.offset, f"the checksum of attachment {record.name!r} is wrong")
             )
-        self._index.point(Opcode.ATTACHMENT, frame.offset, frame.length, record.name)
+        if record.media_type != MEDIA_TYPE:
+            text = f"attachment {record.name!r} is said to be {record.media_type!r}"
+            return self._note(Broken(frame.offset, text))
+        self._index.attach(frame.offset, frame.length, record)
         return Attached(frame.offset, record.name, record.data)
 
     def _read_data_end(self, frame: _Frame) -> Iterator[Event]:
@@ -314,11 +324,16 @@ class _Scan:
     def _finish(self, frame: _Frame) -> Generator[Event, None, tuple[bool, int]]:
         """Yield what is wrong with the end; return whether it is one, else where to go on."""
         after = self._size - frame.end - len(MAGIC)
-        problems = list(self._problems_of_the_end(frame))
+        if after > 0 and self._false_ends:
+            # Each would have all that is before it read once more.
+            problems = [Broken(frame.offset, "a second end of the file")]
+        else:
+            problems = list(self._problems_of_the_end(frame))
         if after and problems:
             # Not an end, but a record that was made to look like one, or two files.
             following = self.next_piece(frame.offset + 1)
             if following >= 0:
+                self._false_ends += 1
                 yield self._note(Broken(frame.offset, "an end of the file that is none"))
                 return False, following
         if after > 0:
@@ -349,7 +364,7 @@ class _Scan:
             text = "the checksum over the index is wrong: bytes were changed"
             yield Broken(frame.offset, text, loses=False)
         elif not self._broken:
-            yield from self._index.problems(footer.summary_start)
+            yield from self._index.problems(footer.summary_start, footer.summary_offset_start)
 
     def _learn_from_summary(self) -> None:
         """Take keys from the index at the end, so that a lost first chunk costs only itself."""
@@ -369,23 +384,8 @@ class _Scan:
                     schemas[schema.id] = schema
                 elif one.opcode == Opcode.CHANNEL:
                     channel = self._parse(one, Channel)
-                    self._spare[channel.id] = _definition(channel, schemas)
+                    self._spare[channel.id] = definition_of(channel, schemas)
                 position = one.end
         except _DAMAGE:
             # The scan itself will come here and say so.
             return
-
-
-def _definition(channel: Channel, schemas: dict[int, Schema]) -> Definition:
-    metadata = tuple(channel.metadata.items())
-    schema = schemas.get(channel.schema_id)
-    if schema is None:
-        return Definition(channel.topic, channel.message_encoding, metadata)
-    return Definition(
-        channel.topic,
-        channel.message_encoding,
-        metadata,
-        schema.name,
-        schema.encoding,
-        schema.data,
-    )

@@ -7,10 +7,12 @@ import zlib
 from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO
 
 from fras_log.errors import NoSuchLog, NotAnMcap
 
 _BLOCK = 4 * 2**20
+_LEAST_BLOCK = 2**12
 # Longer than anything that is searched for.
 _OVERLAP = 64
 
@@ -51,12 +53,32 @@ class Source:
 
     def find(self, pattern: re.Pattern[bytes], start: int) -> int:
         """Where the pattern is next, from `start` on; -1 if nowhere."""
+        # It is mostly near: a large block for each of many would be read in vain.
+        size = _LEAST_BLOCK
         while start < self.size:
-            block = self.read(start, start + _BLOCK + _OVERLAP)
+            block = self.read(start, start + size + _OVERLAP)
             if found := pattern.search(block):
                 return start + found.start()
-            start += _BLOCK
+            start += size
+            size = min(2 * size, _BLOCK)
         return -1
+
+
+def open_regular(path: Path, *, buffering: int = -1) -> BinaryIO:
+    """Open a file, and nothing else, for reading.
+
+    Raises
+    ------
+    NoSuchLog
+        It can't be opened, or is no regular file.
+    """
+    try:
+        # A pipe would wait here for someone who writes into it.
+        if not stat.S_ISREG(path.stat().st_mode):
+            raise NoSuchLog(path, "it is no regular file")
+        return path.open("rb", buffering=buffering)
+    except OSError as error:
+        raise NoSuchLog(path, error.strerror or str(error)) from error
 
 
 @contextmanager
@@ -70,14 +92,7 @@ def open_source(path: Path) -> Generator[Source]:
     NotAnMcap
         It is empty.
     """
-    try:
-        # A pipe would wait here for someone who writes into it.
-        if not stat.S_ISREG(path.stat().st_mode):
-            raise NoSuchLog(path, "it is no regular file")
-        file = path.open("rb", buffering=0)
-    except OSError as error:
-        raise NoSuchLog(path, error.strerror or str(error)) from error
-    with file:
+    with open_regular(path, buffering=0) as file:
         source = Source(file.fileno())
         if not source.size:
             raise NotAnMcap(path, "it is empty")

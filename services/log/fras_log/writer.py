@@ -7,7 +7,6 @@ publish time = producer's stamp, log time = arrival. Readable by any MCAP reader
 import json
 import os
 import sys
-from collections import deque
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +15,7 @@ from mcap.writer import CompressionType, Writer
 
 from fras_common.bus import RawSample
 from fras_common.codec import HeaderFields, json_schema, read_header
-from fras_common.topics import topic_of
+from fras_common.topics import may_be_lost, topic_of
 from fras_log.chain import (
     Chain,
     Checkpoint,
@@ -29,36 +28,12 @@ from fras_log.chain import (
 from fras_log.channels import Definition
 from fras_log.errors import LogExists
 from fras_log.keys import Signer
-from fras_log.names import BESIDE, CHECKPOINT, CLOSED, METADATA, PROFILE
+from fras_log.names import BESIDE, CHECKPOINT, CLOSED, MEDIA_TYPE, METADATA, PROFILE
+from fras_log.streams import Streams
 
 CHUNK_BYTES = 1024 * 1024
-# As many as a publisher's cache can send again.
-REMEMBERED = 2000
-
-
-class Stream:
-    """What one publisher sent on one key: its last number, and the latest samples by name."""
-
-    def __init__(self) -> None:
-        self.gap = 0
-        self._last: int | None = None
-        self._order: deque[tuple[int, int]] = deque()
-        self._recent: set[tuple[int, int]] = set()
-
-    def note(self, header: HeaderFields) -> bool:
-        """Take a sample into account; False if it is a copy. `gap` is what is missing before it."""
-        seq = header.seq
-        name = (seq, header.stamp_ns)
-        recent, order = self._recent, self._order
-        if name in recent:
-            return False
-        order.append(name)
-        recent.add(name)
-        if len(order) > REMEMBERED:
-            recent.discard(order.popleft())
-        last, self._last = self._last, seq
-        self.gap = seq - last - 1 if last is not None and seq > last else 0
-        return True
+# What a message takes besides its payload: many empty ones fill a chunk, too.
+MESSAGE_BYTES = 64
 
 
 class LogFile:
@@ -78,6 +53,8 @@ class LogFile:
         Signs the checkpoints of the chain.
     fsync : bool
         Whether a flush waits until the disk has it.
+    streams : Streams, optional
+        What the files before this one of the same log hold.
 
     Raises
     ------
@@ -94,19 +71,21 @@ class LogFile:
         signer: Signer | None = None,
         *,
         fsync: bool = False,
+        streams: Streams | None = None,
     ) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
-        try:
-            self._stream = path.open("xb")
-        except FileExistsError as error:
-            raise LogExists(
-                f"{path} exists: a log is never written over, choose another directory", path=path
-            ) from error
+        if os.path.lexists(path):
+            raise _exists(path)
+        # It gets its name when it says what it is: a recorder that is killed before, or whose disk
+        # is full, leaves no file of the log that says nothing.
+        beside = path.with_name(path.name + ".new")
+        beside.unlink(missing_ok=True)
+        self._stream = beside.open("xb")
         self.path = path
         self.bytes_written = 0
         self.messages = 0
         self.lost = 0
-        self._streams: dict[tuple[str, str], Stream] = {}
+        self._streams = streams or Streams()
         self._signer = signer
         self._fsync = fsync
         self._chunk_bytes = 0
@@ -126,14 +105,25 @@ class LogFile:
             enable_crcs=True,
             enable_data_crcs=True,
         )
+        try:
+            self._begin(opening, attachments, now_ns)
+            _name(beside, path)
+        except (OSError, LogExists):
+            self.abandon()
+            beside.unlink(missing_ok=True)
+            raise
+
+    def _begin(
+        self, opening: Mapping[str, str], attachments: Mapping[str, bytes], now_ns: int
+    ) -> None:
         self._writer.start(profile=PROFILE, library="fras_recorder")
-        self._writer.add_metadata(METADATA, opening)
+        self._writer.add_metadata(METADATA, dict(opening))
         for name, data in attachments.items():
             self._writer.add_attachment(
                 create_time=now_ns,
                 log_time=now_ns,
                 name=name,
-                media_type="application/octet-stream",
+                media_type=MEDIA_TYPE,
                 data=data,
             )
         self.flush()
@@ -147,8 +137,12 @@ class LogFile:
             The sample's header; None for a payload without one, which is recorded all the same.
         """
         header = read_header(sample.payload)
-        if header is not None and self._is_copy(sample.key, header):
-            return header
+        if header is not None:
+            missing = self._streams.note(sample.key, header)
+            if missing is None:
+                return header
+            if missing and not may_be_lost(sample.key):
+                self.lost += missing
         stamp_ns, sequence = (arrival_ns, 0) if header is None else (header.stamp_ns, header.seq)
         self.append(self._define(sample), arrival_ns, stamp_ns, sequence, sample.payload)
         return header
@@ -166,7 +160,7 @@ class LogFile:
         )
         self._chain.add(leaf(channel.digest, log_time, publish_time, sequence, payload))
         self.messages += 1
-        self._chunk_bytes += len(payload)
+        self._chunk_bytes += len(payload) + MESSAGE_BYTES
         if self._chunk_bytes >= CHUNK_BYTES:
             self.flush()
 
@@ -180,6 +174,11 @@ class LogFile:
             os.fsync(self._stream.fileno())
         self._chunk_bytes = 0
         self.bytes_written = self._stream.tell()
+
+    @property
+    def channels(self) -> int:
+        """How many channels there are: keys, and ways in which their payloads travelled."""
+        return len(self._channels)
 
     @property
     def head(self) -> str:
@@ -218,21 +217,6 @@ class LogFile:
         # The raw stream: a buffered one would try again to write what just failed.
         self._stream.raw.close()
 
-    def _is_copy(self, key: str, header: HeaderFields) -> bool:
-        """Count what is missing before this sample; True if it was recorded before.
-
-        A copy has number and stamp of a sample that is here; a lower number alone is no reason to
-        leave anything out of the log, whoever sent what before it.
-        """
-        name = (key, header.source)
-        stream = self._streams.get(name)
-        if stream is None:
-            stream = self._streams[name] = Stream()
-        if not stream.note(header):
-            return True
-        self.lost += stream.gap
-        return False
-
     def _define(self, sample: RawSample) -> Definition:
         name = (sample.key, sample.encoding)
         if name not in self._definitions:
@@ -257,6 +241,27 @@ class LogFile:
         if schema not in self._schemas:
             self._schemas[schema] = self._writer.register_schema(*schema)
         return self._schemas[schema]
+
+
+def _name(beside: Path, path: Path) -> None:
+    """Give a file its name; another one of that name stays."""
+    try:
+        os.link(beside, path)
+    except FileExistsError as error:
+        raise _exists(path) from error
+    except OSError as error:
+        # Not every file system knows a second name.
+        if os.path.lexists(path):
+            raise _exists(path) from error
+        beside.rename(path)
+    else:
+        beside.unlink()
+
+
+def _exists(path: Path) -> LogExists:
+    return LogExists(
+        f"{path} exists: a log is never written over, choose another directory", path=path
+    )
 
 
 def _definition(sample: RawSample) -> Definition:

@@ -23,8 +23,9 @@ from fras_common.topics import (
     topic_of,
 )
 from fras_log import ForeignLog
+from fras_log.events import Broken, Cut, Recorded, Told
 from fras_log.names import METADATA
-from fras_log.scan import Broken, Cut, Recorded, Told, scan
+from fras_log.pieces import scan_log
 from fras_replay.errors import NothingToReplay
 from fras_replay.marks import MarkFinder
 from fras_replay.selection import Selection
@@ -175,7 +176,7 @@ def _survey(path: Path) -> tuple[dict[str, str] | None, list[str], bool, list[st
     keys: dict[str, None] = {}
     ours = False
     damage: list[str] = []
-    for event in scan(path):
+    for event in scan_log(path):
         match event:
             case Told(name=name, content=content) if name == METADATA:
                 opening = content
@@ -191,7 +192,7 @@ def _survey(path: Path) -> tuple[dict[str, str] | None, list[str], bool, list[st
 
 
 def _messages(path: Path) -> Iterator[Recorded]:
-    return (event for event in scan(path) if isinstance(event, Recorded))
+    return (event for event in scan_log(path) if isinstance(event, Recorded))
 
 
 class _Reader:

@@ -7,8 +7,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Protocol
 
+from fras_common.extras import require_extra
 from fras_common.scenario import Scenario
-from fras_common.service.extras import require_extra
 from fras_log.about import refuse_newer, scenario_of, trial_of
 from fras_log.errors import ForeignLog
 from fras_log.export.facts import Fact, Moment, Sentence
@@ -131,7 +131,7 @@ class _Facts(Iterator[Fact]):
         return NothingToExport(self._reader.path, self._reader.damage)
 
     def _told(self) -> Iterator[Fact]:
-        size = max(1, self._reader.path.stat().st_size) if self._reader.path.exists() else 1
+        size = max(1, self._reader.size)
         for message in self._reader.messages():
             if not self._messages:
                 self._understand_log()

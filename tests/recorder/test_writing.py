@@ -1,0 +1,93 @@
+"""The writing thread: its mistakes are the process's."""
+
+import queue
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+
+from fras_common.bus import RawSample
+from fras_common.codec import encode, read_header
+from fras_log import AuditLog, LogHeading, LogReader
+from fras_recorder.completeness import Completeness
+from fras_recorder.writing import PLACES, Opened, Trial, Writing
+from support.verdicts import verdict
+
+
+def nothing(*_: Any) -> None:
+    pass
+
+
+def test_a_mistake_on_the_writing_thread_is_raised_on_the_loop(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    posted: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+    writing = Writing(posted.put, nothing, nothing, nothing)
+    log = AuditLog(tmp_path / "audit.mcap", LogHeading({}), 1)
+    writing.open(lambda: Opened(log, Trial("t-1"), Completeness("t-1")), nothing)
+    posted.get(timeout=10.0)()
+
+    def mistake(*_: Any) -> None:
+        raise ZeroDivisionError("a mistake")
+
+    monkeypatch.setattr(AuditLog, "write", mistake)
+    writing.put(RawSample("sa/verdict", b"", ""), 1)
+    with pytest.raises(ZeroDivisionError):
+        posted.get(timeout=10.0)()
+    writing.end()
+    log.abandon()
+
+
+def test_what_comes_while_nothing_is_open_does_not_pile_up(tmp_path: Path):
+    writing = Writing(nothing, nothing, nothing, nothing)
+    for _ in range(100):
+        writing.put(RawSample("sa/verdict", b"", ""), 1)
+    assert writing.waiting == 0
+    writing.end()
+
+
+def test_what_publishers_cached_finds_room_while_a_log_is_taken_up(tmp_path: Path):
+    """They send it to a new subscriber, too, and what is said meanwhile comes behind it."""
+    posted: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+    facts: list[Any] = []
+    writing = Writing(posted.put, nothing, nothing, nothing)
+    writing.listen()
+    count = 3 * PLACES
+    for _ in range(count):
+        writing.put(RawSample("some/key", b"", ""), 1)
+    log = AuditLog(tmp_path / "audit.mcap", LogHeading({}), 1)
+    writing.open(lambda: Opened(log, Trial("t-1"), Completeness("t-1")), nothing)
+    writing.put(RawSample("some/key", b"", ""), 1)
+    writing.close("closed", facts.append)
+    while not facts:
+        posted.get(timeout=30.0)()
+    assert facts[0].messages == count + 1
+    assert writing.take_dropped() == 0
+    writing.end()
+
+
+@pytest.mark.parametrize(("trial", "kept"), [("t-0", [7]), ("t-1", [7, 5])])
+def test_an_early_sample_of_another_trial_is_known_by_its_number(
+    tmp_path: Path, trial: str, kept: list[int]
+):
+    """Zenoh sends a new subscriber what is cached; the publisher's clock may have been ahead."""
+    posted: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+    facts: list[Any] = []
+    writing = Writing(posted.put, nothing, nothing, nothing)
+    log = AuditLog(tmp_path / "audit.mcap", LogHeading({}), 1)
+    writing.listen()
+    ahead_ns = time.time_ns() + 3_600 * 10**9
+    old = msgspec.structs.replace(verdict(3, trial), source="sa/1", seq=5, stamp_ns=ahead_ns)
+    now = msgspec.structs.replace(verdict(9, "t-1"), source="sa/1", seq=7, stamp_ns=2)
+    cached = [RawSample("sa/verdict", encode(now), "")]
+    writing.put(RawSample("sa/verdict", encode(old), ""), 1)
+    writing.open(lambda: Opened(log, Trial("t-1", 1), Completeness("t-1"), cached), nothing)
+    writing.close("closed", facts.append)
+    while not facts:
+        posted.get(timeout=30.0)()
+    written = [read_header(one.payload) for one in LogReader(tmp_path / "audit.mcap").messages()]
+    assert [header.seq for header in written if header is not None] == kept
+    writing.end()
