@@ -47,11 +47,17 @@ def gone() -> Callable[[int], bool]:
 
 @pytest.fixture
 def tokens(tmp_path: Path) -> Callable[[], set[str]]:
-    """The liveliness tokens that the children have told so far."""
+    """The liveliness tokens of the children that live."""
+
+    def lives(name: str) -> bool:
+        pid = int((tmp_path / f"pid.{name}").read_text())
+        return psutil.pid_exists(pid) and psutil.Process(pid).status() != psutil.STATUS_ZOMBIE
 
     def alive() -> set[str]:
-        notes = (path.name.split(".", 1) for path in tmp_path.glob("*.*"))
-        return {f"{kind}/{name}" for kind, name in notes if kind in ("alive", "ready")}
+        notes = [path.name.split(".", 1) for path in tmp_path.glob("*.*")]
+        return {
+            f"{kind}/{name}" for kind, name in notes if kind in ("alive", "ready") and lives(name)
+        }
 
     return alive
 

@@ -7,6 +7,7 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 parser = argparse.ArgumentParser()
@@ -18,12 +19,19 @@ parser.add_argument("--mutter", default="")
 parser.add_argument("--flood-lines", type=int, default=0)
 parser.add_argument("--die", type=int)
 parser.add_argument("--ignore", nargs="*", default=[])
+parser.add_argument("--die-after", type=int, default=0, help="only after so many lives")
+parser.add_argument("--fill-mb", type=int, default=0)
+parser.add_argument("--linger", action="store_true", help="end only when the file `go` is there")
 parser.add_argument("--deaf", action="store_true", help="never look at standard input")
 parser.add_argument("--listen", help="an endpoint tcp/HOST:PORT")
 parser.add_argument("--grandchild", action="store_true")
 parser.add_argument("--environment", action="store_true")
 options = parser.parse_args()
 folder: Path = options.folder
+
+
+for kind in ("alive", "ready"):  # left by an earlier life
+    (folder / f"{kind}.{options.name}").unlink(missing_ok=True)
 
 
 def note(kind: str, text: str = "") -> None:
@@ -34,6 +42,10 @@ def note(kind: str, text: str = "") -> None:
 
 
 def end(cause: str) -> None:
+    if options.linger:
+        note("ending")
+        while not (folder / "go").exists():
+            time.sleep(0.005)
     with (folder / "ended").open("a") as journal:
         journal.write(f"{options.name} {cause}\n")
     sys.exit(0)
@@ -64,8 +76,12 @@ if options.flood_lines:
     for index in range(options.flood_lines):
         print(f"line {index:07d} {'x' * 80}")
     sys.stdout.flush()
-if options.die is not None:
+with (folder / f"lives.{options.name}").open("a") as lives:
+    lives.write("x")
+    number = lives.tell()
+if options.die is not None and number > options.die_after:
     sys.exit(options.die)
+filling = bytearray(b"x" * (options.fill_mb * 1_000_000))
 note("pid", str(os.getpid()))
 for token in options.tell:
     note(token)

@@ -21,7 +21,7 @@ def test_local_toml_is_the_stack_of_the_design() -> None:
         assert process.needs == ("router",)
         assert process.readiness == "token"
         assert f"fras_{name}" in process.command
-    assert {one.restart for one in table.processes.values()} == {"never"}
+    assert {one.restart for one in table.processes.values()} == {"on-failure"}
     stopping = topological(ended_before(table.processes))
     assert stopping[-2:] == ("recorder", "router")
 
@@ -71,6 +71,19 @@ def test_every_restart_policy_is_valid_in_a_table(restart: str) -> None:
         (ROUTER + "stop_timeout_s = inf\n", "process.router.stop_timeout_s", float("inf"), "3600"),
         (ROUTER + 'stop_timeout_s = "5"\n', "process.router.stop_timeout_s", "5", "number"),
         (ROUTER + "ready_timeout_s = -1\n", "process.router.ready_timeout_s", -1, "above 0"),
+        (ROUTER + "backoff_s = 0\n", "process.router.backoff_s", 0, "above 0"),
+        (
+            ROUTER + "backoff_s = 2\nbackoff_cap_s = 1\n",
+            "process.router.backoff_cap_s",
+            1.0,
+            "not less than backoff_s",
+        ),
+        (ROUTER + "restart_budget = 0\n", "process.router.restart_budget", 0, "from 1"),
+        (ROUTER + "watchdog_s = 1.0\n", "process.router.watchdog_s", 1.0, "0 (off)"),
+        (ROUTER + "loop_watchdog_s = -1\n", "process.router.loop_watchdog_s", -1, "0 (off)"),
+        (ROUTER + "memory_limit_mb = 3\n", "process.router.memory_limit_mb", 3, "from 16"),
+        (ROUTER + "open_files_limit = 9\n", "process.router.open_files_limit", 9, "from 64"),
+        (ROUTER + "nice = 20\n", "process.router.nice", 20, "to 19"),
         ("[process.sim]\ncommand = []\n", "process.sim.command", [], "program first"),
         ('[process.sim]\ncommand = [""]\n', "process.sim.command", [""], "program first"),
         ('[process.sim]\ncommand = "sim"\n', "process.sim.command", "sim", "list of texts"),

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from fras_common.extras import MissingExtra
 from fras_supervisor import (
     AlreadyStarted,
     BadEndpoint,
@@ -19,6 +20,7 @@ from fras_supervisor import (
     ServiceDied,
     StartCancelled,
     TableError,
+    extras,
 )
 
 Make = Callable[..., Any]
@@ -163,15 +165,21 @@ def test_folder_of_logs_that_cannot_be_made_is_named(make_stack: Make, tmp_path:
     assert pids(tmp_path) == []
 
 
-@pytest.mark.parametrize(
-    ("row", "key"), [({"restart": "always"}, "restart"), ({"host": "B"}, "host")]
-)
-def test_what_is_not_built_yet_is_refused_and_not_ignored(
-    make_stack: Make, row: dict[str, str], key: str
+def test_a_host_that_is_not_this_one_is_refused_and_not_ignored(make_stack: Make) -> None:
+    with pytest.raises(TableError, match="`fras up --host B`") as caught:
+        make_stack({"sim": {"host": "B"}})
+    assert caught.value.key == "process.sim.host"
+    make_stack({"sim": {"host": socket.gethostname()}}).start()
+
+
+def test_a_missing_library_is_named_before_anything_starts(
+    make_stack: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with pytest.raises(TableError) as caught:
-        make_stack({"sim": row})
-    assert caught.value.key == f"process.sim.{key}"
+    monkeypatch.setattr(extras, "is_installed", lambda library: library != "clingo")
+    planner = {"command": ["{python}", "-m", "fras_planner"]}
+    with pytest.raises(MissingExtra, match=r"process planner .*'clingo'.*fras\[planner\]"):
+        make_stack({"sim": {}, "planner": planner})
+    assert pids(tmp_path) == []
 
 
 def test_bad_endpoint_is_refused(make_stack: Make) -> None:
@@ -221,7 +229,7 @@ def test_watch_returns_the_dead_with_their_last_lines(make_stack: Make, tmp_path
     os.kill(int((tmp_path / "pid.sim").read_text()), 9)
     (dead,) = stack.watch(10)
     assert dead == Exit("sim", -9, "itself", 0.0, ("tick 7",))
-    assert {one.name: one.state for one in stack.status()} == {"sim": "ended", "sa": "ready"}
+    assert {one.name: one.state for one in stack.status()} == {"sim": "given_up", "sa": "ready"}
     assert stack.stop()["sim"] is dead
 
 

@@ -1,12 +1,13 @@
 import os
 import signal
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from fras_supervisor import Unstoppable, shutdown
+from fras_supervisor import StartCancelled, Unstoppable, shutdown
 
 Make = Callable[..., Any]
 Ended = Callable[[], list[str]]
@@ -27,8 +28,21 @@ def test_stops_in_reverse_order_with_sigint(make_stack: Make, ended: Ended) -> N
     assert ended() == [f"{name} SIGINT" for name in order]
     assert list(exits) == order
     assert {(one.returncode, one.by) for one in exits.values()} == {(0, "SIGINT")}
-    assert {one.state for one in stack.status()} == {"ended"}
+    assert {one.state for one in stack.status()} == {"stopped"}
     assert stack.stop() == exits
+
+
+def test_child_that_is_not_ready_yet_gets_sigterm(make_stack: Make, tmp_path: Path) -> None:
+    # As one that loads its libraries: it would answer SIGINT with a traceback from any of them.
+    started = tmp_path / "started"
+    loads = f"import pathlib, signal; pathlib.Path({str(started)!r}).touch(); signal.pause()"
+    stack = make_stack(
+        {"sim": {"command": [sys.executable, "-c", loads]}}, cancelled=started.exists
+    )
+    with pytest.raises(StartCancelled):
+        stack.start()
+    exit_ = stack.stop()["sim"]
+    assert (exit_.returncode, exit_.by, exit_.last_lines[1:]) == (-15, "SIGTERM", ())
 
 
 def test_child_that_ignores_sigint_gets_sigterm(make_stack: Make, ended: Ended) -> None:
@@ -117,6 +131,7 @@ class Immortal:
     """A child stuck in the kernel, which no test can make for real."""
 
     pid = 1
+    has_started = True
 
     def __init__(self) -> None:
         self.sent: list[tuple[signal.Signals, float]] = []

@@ -53,6 +53,11 @@ class Child:
     alone, and a signal sent here reaches the child's own children too. Its standard input is a
     pipe that nobody writes to: it ends when we do.
 
+    Attributes
+    ----------
+    has_started : bool
+        Whether it was seen to be ready: it then answers SIGINT in order.
+
     Raises
     ------
     CommandNotFound
@@ -67,6 +72,7 @@ class Child:
         self.process = process
         self.launched_at = time.monotonic()
         self.exit: Exit | None = None
+        self.has_started = False
         self._signals: list[tuple[Signals, float]] = []
         # Pipes of our own and not Popen's: the pump owns the output's end, no file object does.
         child_in, self._stdin = os.pipe()

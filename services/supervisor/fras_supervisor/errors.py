@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from fras_common.errors import FrasError
+from fras_common.errors import FrasError, shown
 
 
 class TableError(FrasError):
@@ -16,7 +16,7 @@ class TableError(FrasError):
 
     def __init__(self, file: str, key: str, value: object, allowed: str) -> None:
         super().__init__(
-            f"{file}: {key} = {value!r} is not allowed; allowed: {allowed}",
+            f"{file}: {key} = {shown(value)} is not allowed; allowed: {allowed}",
             file=file,
             key=key,
             value=value,
@@ -34,6 +34,88 @@ class BadEndpoint(FrasError):
             f"endpoint {endpoint!r} is not an address; write it as tcp/HOST:PORT or tls/HOST:PORT "
             "with a port from 1 to 65535, for example tcp/127.0.0.1:7447",
             endpoint=endpoint,
+        )
+
+
+class BadAddress(FrasError):
+    """What should say where a host's router is does not."""
+
+    address: str
+
+    def __init__(
+        self,
+        address: str,
+        form: str = "HOST or HOST:PORT, as 10.0.0.1, robot.lan:7447 or [fd00::1]:7447",
+    ) -> None:
+        super().__init__(
+            f"{address!r} is not the address of a host; write it as {form}", address=address
+        )
+
+
+class UnknownHost(FrasError):
+    """A process table has no host of that name."""
+
+    host: str
+
+    def __init__(self, file: str, host: str, known: Sequence[str]) -> None:
+        there = f"it has {', '.join(known)}" if known else "it has no table [host.NAME] at all"
+        super().__init__(f"{file}: there is no host {host!r}; {there}", file=file, host=host)
+
+
+class NothingOnHost(FrasError):
+    """No process of the table runs on that host."""
+
+    host: str
+
+    def __init__(self, file: str, host: str) -> None:
+        super().__init__(
+            f"{file}: no process is of host {host}: give one `host = {host!r}`, or choose another "
+            "host",
+            file=file,
+            host=host,
+        )
+
+
+class NoAddress(FrasError):
+    """A command needs the router of a host whose address nobody gave."""
+
+    host: str
+    name: str
+
+    def __init__(self, host: str, name: str) -> None:
+        super().__init__(
+            f"process {name} asks for the router of host {host}, and its address is not known: "
+            f"give it with --address {host}=HOST[:PORT], or as `address` in [host.{host}]",
+            host=host,
+            name=name,
+        )
+
+
+class OnOtherHost(FrasError):
+    """A process that another host's supervisor keeps."""
+
+    name: str
+    host: str
+
+    def __init__(self, name: str, host: str) -> None:
+        super().__init__(
+            f"process {name} is of host {host}: ask there, or with --connect and the endpoint of "
+            f"{host}'s router",
+            name=name,
+            host=host,
+        )
+
+
+class AddressNotHere(FrasError):
+    """A router is to listen on an address that is none of this machine's."""
+
+    address: str
+
+    def __init__(self, address: str) -> None:
+        super().__init__(
+            f"{address} is no address of this machine (`ip address` lists them): correct --address "
+            "of this host",
+            address=address,
         )
 
 
@@ -80,6 +162,34 @@ class LogDirUnusable(FrasError):
             f"log folder {path} can't be written ({reason}); choose another one or free space",
             path=path,
             reason=reason,
+        )
+
+
+class LimitRefused(FrasError):
+    """The system does not let us limit a process as the table asks."""
+
+    name: str
+    limits: str
+    reason: str
+
+    def __init__(self, name: str, limits: str, reason: str) -> None:
+        super().__init__(
+            f"process {name}: {limits} can't be set ({reason}); a negative nice and more open "
+            "files than the supervisor's need a privilege: leave them out, or grant it",
+            name=name,
+            limits=limits,
+            reason=reason,
+        )
+
+
+class UnknownProcess(FrasError):
+    """No process of that name is in the table."""
+
+    name: str
+
+    def __init__(self, name: str, known: Sequence[str]) -> None:
+        super().__init__(
+            f"there is no process {name!r} in the table; there are {', '.join(known)}", name=name
         )
 
 

@@ -52,6 +52,11 @@ class OrphanGuard:
         """Process id of the guard."""
         return self._process.pid
 
+    @property
+    def is_alive(self) -> bool:
+        """Whether nobody has ended it."""
+        return self._process.poll() is None
+
     def watch(self, pid: int) -> None:
         """End the process group that `pid` leads when we are gone.
 

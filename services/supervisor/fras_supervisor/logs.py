@@ -13,6 +13,8 @@ from fras_supervisor.errors import LogDirUnusable
 CHUNK: Final = 65_536
 LONGEST_LINE: Final = 8_192
 DRAIN_LIMIT: Final = 1 << 20
+MAX_BYTES: Final = 5_000_000
+KEPT_FILES: Final = 3
 
 Echo = Callable[[str, str], None]
 """Called with a process's name and one line of its output; must not block."""
@@ -42,7 +44,7 @@ class RotatingFile:
         The file can't be opened.
     """
 
-    def __init__(self, path: Path, max_bytes: int = 5_000_000, keep: int = 3) -> None:
+    def __init__(self, path: Path, max_bytes: int = MAX_BYTES, keep: int = KEPT_FILES) -> None:
         self.path = path
         self.lost_bytes = 0
         self._max_bytes = max_bytes

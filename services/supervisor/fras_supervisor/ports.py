@@ -9,7 +9,7 @@ from typing import Final
 
 import psutil
 
-from fras_supervisor.errors import BadEndpoint, PortTaken
+from fras_supervisor.errors import AddressNotHere, BadEndpoint, PortTaken
 
 FIRST_PORT: Final = 20_000
 TRIES: Final = 200
@@ -59,8 +59,18 @@ def free_port(host: str = "127.0.0.1") -> int:
 
 
 def require_free(endpoint: Endpoint) -> None:
-    """Raise `PortTaken`, naming the holder if that can be told, unless the port can be bound."""
+    """Raise an error unless the port can be bound.
+
+    Raises
+    ------
+    AddressNotHere
+        The address is none of this machine's.
+    PortTaken
+        Naming the holder if that can be told.
+    """
     if not _can_bind(endpoint.host, endpoint.port):
+        if not _can_bind(endpoint.host, 0):
+            raise AddressNotHere(endpoint.host)
         raise PortTaken(endpoint.port, holder_of(endpoint.port))
 
 

@@ -1,33 +1,40 @@
-"""A stack: all processes of a table, started in order of need, watched, stopped in reverse."""
+"""A stack: all processes of a table, started in order of need, kept, stopped in reverse."""
 
+import random
 import shutil
 import sys
 import time
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Final, Literal, Self
+from typing import Final, Self
 
+from fras_common.errors import FrasError
 from fras_supervisor.child import Child, Exit
 from fras_supervisor.errors import (
     AlreadyStarted,
     CommandNotFound,
     LogDirUnusable,
     NotReady,
+    OnOtherHost,
     ServiceDied,
     StartCancelled,
-    TableError,
+    UnknownProcess,
 )
+from fras_supervisor.extras import require_installed
 from fras_supervisor.guard import OrphanGuard
+from fras_supervisor.hosts import placeholder, require_here
+from fras_supervisor.limits import apply_limits
 from fras_supervisor.logs import Echo, RotatingFile
+from fras_supervisor.member import Event, Member, State
 from fras_supervisor.order import ended_before, start_order
 from fras_supervisor.ports import Endpoint, accepts, require_free
 from fras_supervisor.shutdown import shut_down
 from fras_supervisor.table import Table, check_placeholders, expand
 
 POLL_S: Final = 0.01
-
-State = Literal["pending", "starting", "ready", "ended"]
+GONE: Final = ("ended", "given_up")
 
 
 @dataclass(frozen=True)
@@ -38,16 +45,24 @@ class Status:
     ----------
     name : str
         Its name in the table.
-    state : {"pending", "starting", "ready", "ended"}
-        Not launched yet; launched; ready; dead.
+    state : str
+        See `fras_common.messages.ProcessReport`.
     pid : int or None
-        Process id, if it was launched.
+        Process id of its newest life, if it was launched.
     ready_after_s : float or None [s]
-        From the start of the stack until it was ready.
+        From the start of the stack until its newest life was ready.
     log : Path
         Its newest log file.
     log_lost_bytes : int
-        Output that could not be written to the log.
+        Output of its newest life that could not be written to the log.
+    restarts : int
+        How often it was started again.
+    last_exit : str
+        How it last ended, in words; empty if it never did.
+    reason : str
+        Why it stands where it stands, if that is no good place.
+    starts_in_s, up_s : float [s]
+        What is left of its back-off, and since when it lives; 0 else.
     """
 
     name: str
@@ -56,10 +71,15 @@ class Status:
     ready_after_s: float | None
     log: Path
     log_lost_bytes: int
+    restarts: int
+    last_exit: str
+    reason: str
+    starts_in_s: float
+    up_s: float
 
 
 class Stack:
-    """The processes of one cell; used from one thread.
+    """The processes of one cell; used from one thread at a time.
 
     Parameters
     ----------
@@ -83,6 +103,8 @@ class Stack:
     cancelled : callable, optional
         Looked at while starting; true ends the start with `StartCancelled`. For signal handlers
         that set a flag: a KeyboardInterrupt also stops everything, but could hit anywhere.
+    chance : callable, optional
+        From 0 to 1, for the back-off.
 
     Raises
     ------
@@ -92,6 +114,8 @@ class Stack:
         `connect` is not an endpoint.
     CommandNotFound
         A program is not on this machine.
+    MissingExtra
+        The libraries of a service are not installed.
     """
 
     def __init__(
@@ -105,16 +129,18 @@ class Stack:
         values: Mapping[str, str] | None = None,
         echo: Echo | None = None,
         cancelled: Callable[[], bool] = lambda: False,
+        chance: Callable[[], float] = random.random,
     ) -> None:
-        _check_supported(table)
+        for process in table.processes.values():
+            require_here(table.source, process)
         self.table = table
         self.log_dir = log_dir
         self._endpoint = Endpoint.parse(connect)
+        self._reached_at = Endpoint.parse((values or {}).get(placeholder(table.here), connect))
         self._alive = alive
         self._echo = echo
         self._cancelled = cancelled
         self._processes = table.processes
-        self._order = start_order(self._processes)
         shared = {
             **(values or {}),
             "python": sys.executable,
@@ -124,33 +150,43 @@ class Stack:
         }
         for process in self._processes.values():
             check_placeholders(table.source, process, {*shared, "name"})
-        self._commands = {
+        commands = {
             name: expand(process, {**shared, "name": name})
             for name, process in self._processes.items()
         }
-        for name, command in self._commands.items():
+        for name, command in commands.items():
             if shutil.which(command[0]) is None:
                 raise CommandNotFound(name, command[0])
+            if command[0] == sys.executable:
+                require_installed(name, command)
+        self._members = {
+            name: Member(
+                self._processes[name], partial(self._launched, name, commands[name]), chance
+            )
+            for name in start_order(self._processes)
+        }
         self._guard: OrphanGuard | None = None
         self._started_at: float | None = None
-        self._children: dict[str, Child] = {}
-        self._ready_after_s: dict[str, float] = {}
+        self._stopping = False
 
     def start(self) -> None:
         """Launch every process as soon as all that it needs is ready; return when all are.
 
-        On any error everything that was launched is stopped before it is raised.
+        Nothing is started again here: who can't start the first time is a mistake to be told. On
+        any error everything that was launched is stopped before it is raised.
 
         Raises
         ------
-        PortTaken
-            Somebody listens on the router's port; nothing was started.
+        AddressNotHere, PortTaken
+            Somebody listens on the router's port, or it is of another machine; nothing was started.
         LogDirUnusable
             Logs can't be written; nothing was started.
         ServiceDied
             A process ended.
         NotReady
             A process was not ready within its `ready_timeout_s`.
+        LimitRefused
+            A limit can't be set.
         StartCancelled
             `cancelled` said so.
         AlreadyStarted
@@ -160,15 +196,18 @@ class Stack:
             raise AlreadyStarted
         if any(process.readiness == "listening" for process in self._processes.values()):
             require_free(self._endpoint)
+            require_free(self._reached_at)
         try:
             self.log_dir.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise LogDirUnusable(self.log_dir, str(error)) from error
         self._started_at = time.monotonic()
         try:
-            self._guard = OrphanGuard(max(one.stop_timeout_s for one in self._processes.values()))
+            self._guard = self._new_guard()
             while True:
-                self._launch_what_can(self._started_at)
+                self._mark_ready()
+                for member in self._due(time.monotonic()):
+                    self._launch(member, stale=False)
                 waiting = self._waiting()
                 if not waiting:
                     return
@@ -179,19 +218,55 @@ class Stack:
             self.stop()
             raise
 
+    def turn(self) -> list[Event]:
+        """Do what is due: see who has ended, who is ready, and start again who may be.
+
+        To be called often once the stack has started. Returns what there is to tell.
+        """
+        if self._stopping:
+            return []
+        now_s = time.monotonic()
+        told = [member.kill_if_overdue(now_s) for member in self._members.values()]
+        told += [member.reap(now_s) for member in self._members.values()]
+        told += self._mark_ready()
+        for member in self._members.values():
+            member.urge()
+        self._keep_guard()
+        told += [self._launch_again(member) for member in self._due(now_s)]
+        return [event for event in told if event is not None]
+
+    def kill(self, name: str, why: str) -> Event | None:
+        """End a process at once, as a failure of its own; nothing if it does not live."""
+        return self._member(name).kill(why)
+
+    def restart(self, name: str) -> Event:
+        """Order a restart, also of a process that was given up.
+
+        Raises
+        ------
+        OnOtherHost, UnknownProcess
+        """
+        return self._member(name).restart(time.monotonic())
+
     def watch(self, timeout_s: float = 0.0) -> tuple[Exit, ...]:
-        """Give the processes that have ended; wait up to `timeout_s` for a first one."""
+        """Turn for up to `timeout_s`, until some have gone for good; tell how those ended."""
         deadline = time.monotonic() + timeout_s
         while True:
-            ended = tuple(
-                one for child in self._children.values() if (one := child.poll()) is not None
-            )
-            if ended or time.monotonic() >= deadline:
-                return ended
+            self.turn()
+            gone = self.gone()
+            if gone or time.monotonic() >= deadline:
+                return gone
             time.sleep(POLL_S)
+
+    def gone(self) -> tuple[Exit, ...]:
+        """Tell how those ended that will not be started again."""
+        children = (one.child for one in self._members.values() if one.state in GONE)
+        return tuple(one.exit for one in children if one is not None and one.exit is not None)
 
     def stop(self) -> dict[str, Exit]:
         """Stop all that lives: SIGINT, wait, SIGTERM, wait, SIGKILL, dependents first.
+
+        Nothing is started again from here on, whatever ends meanwhile.
 
         Returns
         -------
@@ -204,7 +279,13 @@ class Stack:
         Unstoppable
             A process outlived SIGKILL.
         """
-        exits = shut_down(self._children, ended_before(self._processes), POLL_S)
+        self._stopping = True
+        children = {
+            name: one.child for name in self._processes if (one := self._members[name]).child
+        }
+        exits = shut_down(children, ended_before(self._processes), POLL_S)
+        for member in self._members.values():
+            member.has_stopped()
         if self._guard is not None:
             self._guard.dismiss()
             self._guard = None
@@ -212,7 +293,7 @@ class Stack:
 
     def status(self) -> tuple[Status, ...]:
         """Say where each process stands, in the table's order."""
-        return tuple(self._status(name) for name in self._processes)
+        return tuple(self._status(self._members[name]) for name in self._processes)
 
     def __enter__(self) -> Self:
         self.start()
@@ -221,71 +302,99 @@ class Stack:
     def __exit__(self, *_: object) -> None:
         self.stop()
 
-    def _launch_what_can(self, started_at: float) -> None:
-        """Find out who is ready now, and launch those that waited for nothing else."""
-        self._mark_ready(started_at)
-        for name in self._order:
-            needs = self._processes[name].needs
-            if name not in self._children and all(one in self._ready_after_s for one in needs):
-                self._launch(name)
+    def _member(self, name: str) -> Member:
+        if (host := self.table.elsewhere.get(name)) is not None:
+            raise OnOtherHost(name, host)
+        if name not in self._members:
+            raise UnknownProcess(name, tuple(self._processes))
+        return self._members[name]
 
-    def _launch(self, name: str) -> None:
+    def _due(self, now_s: float) -> list[Member]:
+        """Those whose time has come, and who need nobody who is not ready."""
+        return [
+            member
+            for member in self._members.values()
+            if (member.state == "pending" or (member.state == "waiting" and now_s >= member.due_s))
+            and all(self._members[need].state == "ready" for need in member.process.needs)
+        ]
+
+    def _launched(self, name: str, command: tuple[str, ...]) -> Child:
         log = RotatingFile(self.log_dir / f"{name}.log")
-        command = self._commands[name]
         stamp = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
         log.write(f"[supervisor] {stamp} {' '.join(command)}\n".encode())
-        child = Child(self._processes[name], command, log, self._echo)
-        self._children[name] = child
-        if self._guard is not None:
-            self._guard.watch(child.pid)
+        return Child(self._processes[name], command, log, self._echo)
 
-    def _mark_ready(self, started_at: float) -> None:
-        starting = [name for name in self._children if name not in self._ready_after_s]
-        conditions = {name: self._processes[name].readiness for name in starting}
-        tokens = self._alive() if {"token", "alive"} & set(conditions.values()) else ()
-        for name in starting:
-            if conditions[name] == "listening":
-                ready = accepts(self._endpoint)
-            else:
-                ready = f"{'ready' if conditions[name] == 'token' else 'alive'}/{name}" in tokens
-            if ready:
-                self._ready_after_s[name] = time.monotonic() - started_at
+    def _launch(self, member: Member, stale: bool) -> None:
+        member.launch(stale)
+        if member.child is not None:
+            if self._guard is not None:
+                self._guard.watch(member.child.pid)
+            apply_limits(member.process, member.child.pid)
+
+    def _new_guard(self) -> OrphanGuard:
+        return OrphanGuard(max(one.stop_timeout_s for one in self._processes.values()))
+
+    def _keep_guard(self) -> None:
+        """Put another guard in the place of one that somebody ended."""
+        if self._guard is not None and not self._guard.is_alive:
+            self._guard.dismiss()
+            self._guard = self._new_guard()
+            for member in self._members.values():
+                if member.child is not None and member.is_living:
+                    self._guard.watch(member.child.pid)
+
+    def _launch_again(self, member: Member) -> Event | None:
+        try:
+            self._launch(member, stale=self._condition(member, self._tokens([member])))
+        except FrasError as error:
+            # Its program or its log has gone, and no later try can mend that.
+            return member.give_up(str(error))
+        return None
+
+    def _tokens(self, members: Collection[Member]) -> Collection[str]:
+        told_by_token = any(one.process.readiness in ("token", "alive") for one in members)
+        return self._alive() if told_by_token else ()
+
+    def _condition(self, member: Member, tokens: Collection[str]) -> bool:
+        if member.process.readiness == "listening":
+            return accepts(self._endpoint)
+        kind = "ready" if member.process.readiness == "token" else "alive"
+        return f"{kind}/{member.name}" in tokens
+
+    def _mark_ready(self) -> list[Event | None]:
+        starting = [member for member in self._members.values() if member.state == "starting"]
+        tokens = self._tokens(starting)
+        started_s = self._started_at or 0.0
+        return [
+            member.look(self._condition(member, tokens), time.monotonic(), started_s)
+            for member in starting
+        ]
 
     def _waiting(self) -> tuple[str, ...]:
         """Names not ready yet; raises if one of all has died or is overdue."""
-        for name, child in self._children.items():
-            if (ended := child.poll()) is not None:
+        for name, member in self._members.items():
+            if member.child is not None and (ended := member.child.poll()) is not None:
                 raise ServiceDied(name, ended.returncode, ended.last_lines)
-        waiting = tuple(name for name in self._order if name not in self._ready_after_s)
-        for name in waiting:
-            if (child := self._children.get(name)) is not None:
+        waiting = {name: one for name, one in self._members.items() if one.state != "ready"}
+        for name, member in waiting.items():
+            if (child := member.child) is not None:
                 waited_s = time.monotonic() - child.launched_at
                 if waited_s >= child.process.ready_timeout_s:
-                    raise NotReady(name, waited_s, child.pump.last_lines(), waiting)
-        return waiting
+                    raise NotReady(name, waited_s, child.pump.last_lines(), tuple(waiting))
+        return tuple(waiting)
 
-    def _status(self, name: str) -> Status:
-        child = self._children.get(name)
-        state: State = "pending"
-        if child is not None:
-            state = "ready" if name in self._ready_after_s else "starting"
-            state = "ended" if child.poll() is not None else state
+    def _status(self, member: Member) -> Status:
+        child = member.child
         return Status(
-            name=name,
-            state=state,
+            name=member.name,
+            state=member.state,
             pid=None if child is None else child.pid,
-            ready_after_s=self._ready_after_s.get(name),
-            log=self.log_dir / f"{name}.log",
+            ready_after_s=member.ready_after_s,
+            log=self.log_dir / f"{member.name}.log",
             log_lost_bytes=0 if child is None else child.pump.file.lost_bytes,
+            restarts=member.restarts,
+            last_exit=member.last_exit,
+            reason="" if member.state == "ready" else member.reason,
+            starts_in_s=member.waiting_s(time.monotonic()),
+            up_s=member.up_s(),
         )
-
-
-def _check_supported(table: Table) -> None:
-    """Refuse what a table may say but this supervisor does not do, rather than ignore it."""
-    for name, process in table.processes.items():
-        if process.restart != "never":
-            key = f"process.{name}.restart"
-            raise TableError(table.source, key, process.restart, "never (no restarts yet)")
-        if process.host != "localhost":
-            key = f"process.{name}.host"
-            raise TableError(table.source, key, process.host, "localhost (no other hosts yet)")

@@ -47,7 +47,7 @@ def shut_down(
             if (ended := child.poll()) is not None:
                 exits[name] = ended
                 del living[name]
-            elif not any(other in living for other in ended_before[name]) and _escalate(child):
+            elif not any(other in living for other in ended_before[name]) and escalate(child):
                 stuck[name] = child.pid
                 del living[name]
         if living:
@@ -57,12 +57,15 @@ def shut_down(
     return exits
 
 
-def _escalate(child: Child) -> bool:
+def escalate(child: Child) -> bool:
     """Send the next signal when its time has come; true if there is none left to send."""
     number, sent_at = child.last_signal() or (None, 0.0)
     waited_s = time.monotonic() - sent_at
     if number is SIGKILL:
         return waited_s >= KILL_WAIT_S
-    if number is None or waited_s >= child.process.stop_timeout_s:
+    if number is None and not child.has_started:
+        # One that still loads its libraries would answer SIGINT with a traceback from any of them.
+        child.send(SIGTERM)
+    elif number is None or waited_s >= child.process.stop_timeout_s:
         child.send(NEXT[number])
     return False

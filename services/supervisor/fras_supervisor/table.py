@@ -11,12 +11,17 @@ from typing import Annotated, Final, Literal, cast
 import msgspec
 from msgspec import Meta
 
+from fras_common.files import TEXT_BYTES, read_at_most
 from fras_supervisor.errors import TableError
+from fras_supervisor.hosts import check_hosts, placeholder, read_hosts, services_placeholder
 from fras_supervisor.order import ended_before, find_cycle
+from fras_supervisor.policy import Restart, Rules
+from fras_supervisor.producers import check_producers
+from fras_supervisor.watchdog import Patience
 
 Readiness = Literal["token", "alive", "listening"]
-Restart = Literal["never", "on-failure", "always"]
 Seconds = Annotated[float, Meta(gt=0, le=3600)]
+SecondsOrOff = Annotated[float, Meta(ge=0, le=3600)]
 
 PLACEHOLDERS: Final = ("python", "cell", "connect", "log_dir", "name")
 """What a command may ask for in braces; `Stack` fills them in."""
@@ -29,6 +34,16 @@ ALLOWED: Final = {
     "listening (the port of the endpoint accepts)",
     "ready_timeout_s": "a number of seconds above 0, up to 3600",
     "restart": "never, on-failure, always",
+    "backoff_s": "a number of seconds above 0, up to 3600",
+    "backoff_cap_s": "a number of seconds above 0, up to 3600, not less than backoff_s",
+    "stable_s": "a number of seconds above 0, up to 3600",
+    "restart_budget": "a whole number from 1 to 1000",
+    "restart_window_s": "a number of seconds above 0, up to 3600",
+    "watchdog_s": "0 (off) or a number of seconds from 2 to 3600",
+    "loop_watchdog_s": "0 (off) or a number of seconds from 2 to 3600",
+    "memory_limit_mb": "0 (none) or a whole number from 16",
+    "open_files_limit": "0 (as inherited) or a whole number from 64",
+    "nice": "a whole number from -20 to 19",
     "host": "the name of a host: letters, digits, dots, dashes",
     "stop_timeout_s": "a number of seconds above 0, up to 3600",
 }
@@ -54,7 +69,24 @@ class Process(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     ready_timeout_s : float [s]
         Not ready for so long after its launch is a fault.
     restart : {"never", "on-failure", "always"}
-        What to do when it ends unasked.
+        What to do when it ends unasked; on-failure: unless with exit status 0.
+    backoff_s, backoff_cap_s : float [s]
+        Pause before the first restart, doubled with every failure in a row, and the longest pause.
+    stable_s : float [s]
+        Who ran for so long begins with the first pause again.
+    restart_budget : int
+        So many restarts within `restart_window_s`; one more, and it is given up.
+    restart_window_s : float [s]
+    watchdog_s : float [s]
+        No sign of life for so long, and it is killed; 0: never.
+    loop_watchdog_s : float [s]
+        Its loop stuck for so long, and it is killed; 0: never.
+    memory_limit_mb : int [MB]
+        Resident memory beyond it, and it is killed; 0: no limit.
+    open_files_limit : int
+        Files it may have open at a time; 0: as many as the supervisor.
+    nice : int
+        Added to its niceness.
     host : str
         Where it runs.
     stop_timeout_s : float [s]
@@ -70,20 +102,71 @@ class Process(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     restart: Restart = "never"
     host: Annotated[str, Meta(pattern=r"^[A-Za-z0-9][A-Za-z0-9.-]*$")] = "localhost"
     stop_timeout_s: Seconds = 5.0
+    backoff_s: Seconds = 0.5
+    backoff_cap_s: Seconds = 10.0
+    stable_s: Seconds = 30.0
+    restart_budget: Annotated[int, Meta(ge=1, le=1000)] = 5
+    restart_window_s: Seconds = 60.0
+    watchdog_s: SecondsOrOff = 5.0
+    loop_watchdog_s: SecondsOrOff = 60.0
+    memory_limit_mb: Annotated[int, Meta(ge=0)] = 0
+    open_files_limit: Annotated[int, Meta(ge=0)] = 0
+    nice: Annotated[int, Meta(ge=-20, le=19)] = 0
+
+    @property
+    def rules(self) -> Rules:
+        """How often, and after what pause, it is started again."""
+        return Rules(
+            self.restart,
+            self.backoff_s,
+            self.backoff_cap_s,
+            self.stable_s,
+            self.restart_budget,
+            self.restart_window_s,
+        )
+
+    @property
+    def patience(self) -> Patience:
+        """How long it may give no sign of life."""
+        return Patience(self.watchdog_s, self.loop_watchdog_s)
+
+
+SMALLEST: Final = {
+    "watchdog_s": 2.0,
+    "loop_watchdog_s": 2.0,
+    "memory_limit_mb": 16,
+    "open_files_limit": 64,
+}
+"""What a limit may be besides 0: health comes twice a second, and a service must be able to run."""
 
 
 class Table(msgspec.Struct, frozen=True):
-    """All processes of a stack, in the file's order, and where they were read."""
+    """Processes of a stack, in the file's order, and where they were read.
+
+    Attributes
+    ----------
+    source : str
+    processes : dict of name to Process
+    hosts : dict of name to str
+        Hosts, each with the address of its router, or none; empty: all is on one machine.
+    here : str
+        The host that `processes` are of; empty: those of all.
+    elsewhere : dict of name to str
+        Processes of other hosts, and whose they are; see `place`.
+    """
 
     source: str
     processes: dict[str, Process]
+    hosts: dict[str, str] = {}
+    here: str = ""
+    elsewhere: dict[str, str] = {}
 
     def with_arguments(self, name: str, *arguments: str) -> "Table":
         """Return the same table with a process that takes some arguments more, as they stand."""
         process = self.processes[name]
         literal = tuple(word.replace("{", "{{").replace("}", "}}") for word in arguments)
         changed = msgspec.structs.replace(process, command=(*process.command, *literal))
-        return Table(self.source, {**self.processes, name: changed})
+        return msgspec.structs.replace(self, processes={**self.processes, name: changed})
 
 
 def find_table(name: str = "local") -> Path:
@@ -103,7 +186,8 @@ def load_table(path: Path | str, placeholders: Collection[str] = PLACEHOLDERS) -
     Parameters
     ----------
     path : Path or str
-        A TOML file with one table `[process.NAME]` a process.
+        A TOML file with one table `[process.NAME]` a process, and, if there are several hosts, one
+        table `[host.NAME]` a host.
     placeholders : collection of str
         Names that commands may ask for in braces.
 
@@ -114,7 +198,7 @@ def load_table(path: Path | str, placeholders: Collection[str] = PLACEHOLDERS) -
         allowed, a name is unknown, a placeholder is unknown, processes wait for each other.
     """
     try:
-        text = Path(path).read_text(encoding="utf-8")
+        text = read_at_most(Path(path), TEXT_BYTES).decode()
     except (OSError, UnicodeDecodeError) as error:
         raise TableError(str(path), "file", str(error), "a readable TOML file") from error
     return parse_table(text, str(path), placeholders)
@@ -124,21 +208,28 @@ def parse_table(text: str, source: str, placeholders: Collection[str] = PLACEHOL
     """Make a table of TOML text; `source` names it in errors. See `load_table`."""
     try:
         raw = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        # A process or a key that is there twice ends here; tomllib names it and its line.
+    except (ValueError, RecursionError) as error:
+        # A process or a key that is there twice ends here; tomllib names it and its line. It also
+        # lets through what int() says of too many digits, and nesting without end.
         raise TableError(source, "file", str(error), "TOML, each key once") from error
     for key in raw:
-        if key != "process":
-            raise TableError(source, key, raw[key], "only tables [process.NAME]")
+        if key not in ("process", "host"):
+            raise TableError(source, key, raw[key], "only tables [process.NAME] and [host.NAME]")
     rows = _as_table(raw.get("process"))
     if not rows:
         raise TableError(source, "process", raw.get("process"), "at least one table [process.NAME]")
     processes = {name: _read_row(source, name, row) for name, row in rows.items()}
+    hosts = read_hosts(source, raw.get("host", {}))
+    of_hosts = (*map(placeholder, hosts), *map(services_placeholder, hosts))
+    known = (*placeholders, *of_hosts)
     for process in processes.values():
         _check_names(source, process, processes)
-        check_placeholders(source, process, placeholders)
+        _check_limits(source, process)
+        check_placeholders(source, process, known)
+    check_hosts(source, processes, hosts)
     _check_cycles(source, processes)
-    return Table(source=source, processes=processes)
+    check_producers(source, processes)
+    return Table(source, processes, hosts)
 
 
 def check_placeholders(source: str, process: Process, known: Collection[str]) -> None:
@@ -195,6 +286,16 @@ def _check_names(source: str, process: Process, known: Collection[str]) -> None:
                 others = ", ".join(one for one in known if one != process.name)
                 allowed = f"names of other processes, each once: {others or 'there is no other'}"
                 raise TableError(source, f"process.{process.name}.{key}", name, allowed)
+
+
+def _check_limits(source: str, process: Process) -> None:
+    for key, smallest in SMALLEST.items():
+        value = getattr(process, key)
+        if 0 < value < smallest:
+            raise TableError(source, f"process.{process.name}.{key}", value, ALLOWED[key])
+    if process.backoff_cap_s < process.backoff_s:
+        key = f"process.{process.name}.backoff_cap_s"
+        raise TableError(source, key, process.backoff_cap_s, ALLOWED["backoff_cap_s"])
 
 
 def _fills(word: str, known: Collection[str]) -> bool:
