@@ -45,6 +45,10 @@ class Leader(ShellBench):
         self.joints: list[JointState] = self.heard(PSM1.measured_js)
         self.tips: list[TipState] = self.heard(PSM1.measured_cp)
 
+    def planner_says(self, status: TaskStatus) -> None:
+        self.peers(TASK_STATUS).put(status)
+        self.settle()
+
     def tell(self, topic: Any, message: Header) -> None:
         self.client.publisher(topic).put(message)
         self.settle()
@@ -241,7 +245,7 @@ def near_home() -> ServoJoints:
 
 def test_while_a_trial_runs_only_motion_leads_them(leader: Leader) -> None:
     leader.client.announce("alive/planner")
-    leader.tell(TASK_STATUS, task("acting"))
+    leader.planner_says(task("acting"))
     leader.tell(PSM1.servo_jp, near_home())
     assert leader.reasons() == [(PSM1.servo_jp.key, "CommandRefused", "trial_runs")]
     motion = MemoryBus(leader.fabric, "cell", "motion/7")
@@ -252,12 +256,12 @@ def test_while_a_trial_runs_only_motion_leads_them(leader: Leader) -> None:
         )
     )
     motion.close()
-    leader.tell(TASK_STATUS, task("ended"))
+    leader.planner_says(task("ended"))
     leader.tell(PSM1.servo_jp, ServoJoints(joints=HOME["psm1"].joints))
     assert len(leader.faults) == 1
 
 
 def test_a_trial_whose_planner_is_gone_keeps_nobody_from_leading_them(leader: Leader) -> None:
-    leader.tell(TASK_STATUS, task("acting"))
+    leader.planner_says(task("acting"))
     leader.tell(PSM1.servo_jp, near_home())
     assert leader.faults == []

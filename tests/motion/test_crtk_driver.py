@@ -159,3 +159,19 @@ def test_arms_that_are_not_at_home_begin_no_trial() -> None:
         "psm2": CrtkDriver("psm2", HandMadeLink(at(HOME["psm2"]))),
     }
     fault(lambda: MotionController(MotionParameters(), drivers=drivers))
+
+
+def test_an_arm_is_taken_over_where_it_was_last_sent() -> None:
+    sent = replace(AT_HOME, joints=off(AT_HOME.joints, 0, 0.3))
+    now = at(replace(sent, joints=off(sent.joints, 0, 0.1)))
+    link = HandMadeLink(now, at(sent))
+    driver = CrtkDriver("psm1", link)
+    assert driver.resume(sent, at(AT_HOME), 41) == now
+    assert link.heard == [("psm1", None)]
+    assert driver.measure(DT_S) == at(sent)
+
+
+def test_an_arm_that_somebody_led_elsewhere_is_not_taken_over() -> None:
+    sent = replace(AT_HOME, joints=off(AT_HOME.joints, 0, 0.3))
+    driver = CrtkDriver("psm1", HandMadeLink(at(AT_HOME)))
+    assert fault(lambda: driver.resume(sent, at(sent), 41)).values["joint"] == JOINT_NAMES[0]

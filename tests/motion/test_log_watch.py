@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 
+from fras_common.bus import MemoryBus, MemoryFabric
 from fras_common.messages import (
     CancelRequest,
     HoldRequest,
@@ -15,7 +16,10 @@ from fras_common.messages import (
     ResumeRequest,
 )
 from fras_common.scenario import RunSection, Scenario, resolve
+from fras_common.service import ServiceHost
 from fras_common.topics import CANCEL, HOLD, MOTION_RESET, RECORDER_LAST, RECORDER_STATUS, RESUME
+from fras_motion.holds import Holds
+from fras_motion.log_watch import LogWatch
 from fras_motion.service import MotionService
 from support.shells import ShellBench
 
@@ -105,3 +109,64 @@ def test_it_lifts_its_own_hold_only(bench: Bench) -> None:
     bench.answer(HOLD, HoldRequest(holder="surgeon", reason="look"))
     bench.say("behind")
     assert bench.say("recording") == {"surgeon": "look"}
+
+
+def test_a_recorder_that_comes_back_is_given_a_moment_to_recover() -> None:
+    """What is said right after a router came back may push out what is being recovered."""
+    now_s = 0.0
+    fabric = MemoryFabric()
+    recorder = MemoryBus(fabric, "cell", "recorder/test")
+    host = ServiceHost("motion")
+    host.attach(MemoryBus(fabric, "cell", "motion/test"))
+    holds = Holds()
+    watch = LogWatch(host, holds, lambda: now_s)
+    watch.begin("t", required=True)
+    recorder.announce("alive/recorder")
+    status = RecorderStatus(
+        trial="t", state="recording", path="", messages=0, bytes=0, lost=0, reason=""
+    )
+    recorder.publisher(RECORDER_STATUS).put(status)
+
+    def held() -> dict[str, str]:
+        while host.drain(0.0):
+            pass
+        watch.wake()
+        return holds.current()
+
+    assert held() == {}
+    recorder.close()
+    assert held() == {"recorder": "the recorder is away"}
+    now_s = 5.0
+    assert "recorder" in held()
+    again = MemoryBus(fabric, "cell", "recorder/test")
+    again.announce("alive/recorder")
+    now_s = 5.9
+    assert "recorder" in held()
+    now_s = 6.1
+    assert held() == {}
+    again.close()
+    host.bus.close()
+
+
+def test_a_log_that_was_opened_before_motion_was_reset_is_watched() -> None:
+    fabric = MemoryFabric()
+    recorder = MemoryBus(fabric, "cell", "recorder/test")
+    host = ServiceHost("motion")
+    host.attach(MemoryBus(fabric, "cell", "motion/test"))
+    holds = Holds()
+    watch = LogWatch(host, holds)
+    recorder.announce("alive/recorder")
+    recorder.publisher(RECORDER_STATUS).put(
+        RecorderStatus(
+            trial="t", state="recording", path="", messages=0, bytes=0, lost=0, reason=""
+        )
+    )
+    while host.drain(0.0):
+        pass
+    watch.begin("t", required=True)
+    recorder.close()
+    while host.drain(0.0):
+        pass
+    watch.wake()
+    assert holds.current() == {"recorder": "the recorder is away"}
+    host.bus.close()

@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
+from structlog.testing import capture_logs
 
 from fras_common.bus import RemoteFault
 from fras_common.codec import decode
@@ -24,10 +25,10 @@ from fras_common.messages import (
     RobotState,
     RpcRecord,
     StateCommand,
-    Verdict,
 )
 from fras_common.scenario import RunSection, Scenario, resolve
 from fras_common.service.health import ProcessMeter
+from fras_common.service.rates import TOLD_AT_ONCE
 from fras_common.topics import (
     ACTION_RESULT,
     CANCEL,
@@ -43,7 +44,9 @@ from fras_common.topics import (
 )
 from fras_motion.safety import GATES
 from fras_motion.service import MotionService
+from support.remembering import Remembering
 from support.shells import ShellBench
+from support.verdicts import verdict
 
 TARGET = (0.03, 0.03, 0.005)
 
@@ -67,25 +70,7 @@ class Bench(ShellBench):
         return self.answer(EXECUTE, request)
 
     def judge(self, tick: int, trial: str = "t", level: Any = "ok") -> None:
-        self._verdicts.put(
-            Verdict(
-                tick=tick,
-                trial=trial,
-                level=level,
-                ok=level == "ok",
-                reason="",
-                max_force_n=0.0,
-                limit_n=0.5,
-                hard_limit_n=1.0,
-                visibility=0.0,
-                visible=False,
-                max_height=[],
-                force_rate_n_s=0.0,
-                crossing_tick=-1,
-                max_node_speed_m_s=0.0,
-                grasped={},
-            )
-        )
+        self._verdicts.put(verdict(tick, trial, level))
         self.settle()
 
     def judge_until_result(self) -> ActionResult:
@@ -172,7 +157,52 @@ def test_bad_goal_is_refused_by_name(bench: Bench, changes: dict[str, Any], reas
 
 
 def test_goal_before_any_reset_is_refused(bench: Bench) -> None:
+    remembers_nothing = Remembering(bench.fabric)
+    bench.settle()
     assert bench.reach().reason == "another_trial"
+    remembers_nothing.close()
+
+
+def test_goal_of_before_a_reset_is_refused_once_one_has_come(bench: Bench) -> None:
+    goal = ExecuteRequest(
+        trial="yesterday", goal_id="g1", name="reach", arm="psm1", block="", target_m=TARGET
+    )
+    early = bench.ask(EXECUTE, goal)
+    # A new process does not know yet which trial is under way, and nobody tells it.
+    assert early == []
+    bench.reset()
+    bench.settle()
+    assert [reply.reason for reply in early] == ["another_trial"]
+
+
+def test_goal_that_was_taken_before_is_refused_and_moves_nothing(bench: Bench) -> None:
+    bench.reset()
+    assert bench.reach("g1").accepted
+    first = bench.judge_until_result()
+    # Word for word: who has not heard the answer asks once more, and nothing moves.
+    assert bench.reach("g1").accepted
+    bench.judge(first.tick)
+    assert bench.reach("g1", target_m=(0.03, 0.035, 0.005)).reason == "goal_used"
+    assert bench.reach("g2", target_m=(0.03, 0.035, 0.005)).accepted
+    # In mid-action, too, and by its own name rather than that of what runs.
+    assert bench.reach("g1").reason == "goal_used"
+    bench.results.clear()
+    second = bench.judge_until_result()
+    assert second.goal_id == "g2"
+    for _ in range(2):
+        assert bench.reach("g1").reason == "goal_used"
+        bench.judge(second.tick)
+    assert bench.states[-1].tick == second.tick
+    assert [one.goal_id for one in bench.results] == ["g2"]
+    assert health(bench).refusals == {"goal_used": 4}
+
+
+def test_goal_that_was_refused_may_be_asked_again(bench: Bench) -> None:
+    bench.reset()
+    assert bench.reach("g1", target_m=(0.5, 0.03, 0.005)).reason == "workspace"
+    assert bench.reach("g1").accepted
+    bench.reset("t2")
+    assert bench.reach("g1", trial="t2").accepted
 
 
 def test_hold_is_answered_before_the_loop_gets_to_it(bench: Bench) -> None:
@@ -330,6 +360,17 @@ def test_refused_goal_is_on_the_bus_with_its_numbers_and_counted(bench: Bench) -
     assert health(bench).refusals == {"another_trial": 1, "workspace": 2}
 
 
+def test_goals_that_are_refused_again_and_again_do_not_fill_the_log(bench: Bench) -> None:
+    bench.reset()
+    bench.host.clock = lambda: 0.0
+    with capture_logs() as logs:
+        for _ in range(TOLD_AT_ONCE + 20):
+            bench.reach(trial="yesterday")
+            bench.settle()
+    assert health(bench).refusals == {"another_trial": TOLD_AT_ONCE + 20}
+    assert [log["event"] for log in logs] == ["goal refused"] * TOLD_AT_ONCE
+
+
 @pytest.mark.parametrize("other", [0, 3, 7])
 def test_verdict_on_another_tick_is_refused_by_name_on_the_bus(bench: Bench, other: int) -> None:
     faults: list[FaultRecord] = bench.heard(FAULT.of(service="motion"))
@@ -392,7 +433,7 @@ def test_what_stops_an_action_is_counted_by_name(bench: Bench) -> None:
         bench.judge(tick)
     bench.judge(20, level="hard")
     bench.judge_until_result()
-    assert bench.reach().reason == "hard_latch"
+    assert bench.reach("g2").reason == "hard_latch"
     bench.reset("t2")
     bench.reach(trial="t2")
     bench.judge(0, trial="t2")

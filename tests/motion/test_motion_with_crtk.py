@@ -23,7 +23,6 @@ from fras_common.messages import (
     ServoJaw,
     ServoJoints,
     StateCommand,
-    Verdict,
 )
 from fras_common.messages.crtk import State
 from fras_common.messages.robot import Joints
@@ -45,6 +44,7 @@ from fras_motion.crtk.link import CrtkLink
 from fras_motion.service import MotionService
 from support.arms import HOME, off
 from support.shells import ShellBench
+from support.verdicts import verdict
 
 PSM1, PSM2 = CRTK
 STILL = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -126,25 +126,7 @@ class Bench(ShellBench):
     def judge(self) -> None:
         """Judge the present tick, and do what is due of the next."""
         tick = self.states[-1].tick
-        self._verdicts.put(
-            Verdict(
-                tick=tick,
-                trial="t",
-                level="ok",
-                ok=True,
-                reason="",
-                max_force_n=0.0,
-                limit_n=0.5,
-                hard_limit_n=1.0,
-                visibility=0.0,
-                visible=False,
-                max_height=[],
-                force_rate_n_s=0.0,
-                crossing_tick=-1,
-                max_node_speed_m_s=0.0,
-                grasped={},
-            )
-        )
+        self._verdicts.put(verdict(tick, "t"))
         for _ in range(TURNS):
             self.settle()
             if self.states[-1].tick > tick or self.results or self.stands_held:

@@ -1,4 +1,4 @@
-"""A thousand random motions and stops, by kinematics that motion does not share."""
+"""Random motions and stops, by kinematics that motion does not share."""
 
 import json
 from collections import Counter
@@ -15,6 +15,7 @@ from fras_cli.bench import run_benchmark
 from fras_motion.controller import MotionController
 from fras_motion.parameters import MotionParameters
 from fras_motion.safety import GATES, GateRefused
+from support import campaign
 
 IDEAL = MotionParameters(driver_time_constant_s=0.0)
 EXACT = 1e-6
@@ -23,14 +24,14 @@ EXACT = 1e-6
 @pytest.fixture(scope="module")
 def motions() -> list[Motion]:
     recorder = Recorder(seed=1)
-    return [recorder.motion() for _ in range(1000)]
+    return [recorder.motion() for _ in range(campaign.length(1000, 200))]
 
 
-def test_no_limit_is_exceeded_in_a_thousand_random_motions(motions):
+def test_no_limit_is_exceeded_in_random_motions(motions):
     assert {motion.goal.arm for motion in motions} == {"psm1", "psm2"}
     counts = Counter(motion.goal.name for motion in motions)
     assert set(counts) == {"reach", "grasp", "pull", "move", "release"}
-    assert min(counts.values()) > 100
+    assert min(counts.values()) > len(motions) / 10
     used = [used_limits(motion, IDEAL) for motion in motions]
     largest = {name: max(row[name] for row in used) for name in used[0]}
     assert max(largest.values()) <= 1.0 + ROUNDING

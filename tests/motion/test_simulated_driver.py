@@ -6,6 +6,7 @@ import pytest
 from fras_motion.drivers import Measured, Setpoint, SimulatedDriver
 
 HOME = Setpoint((0.0, 0.1, 0.12, 0.0, -0.2, 0.3), 1.0)
+STILL = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 THERE = Setpoint((0.2, 0.0, 0.15, 0.1, 0.2, -0.3), -0.3)
 
 
@@ -72,3 +73,28 @@ def test_dead_time_keeps_the_order_of_setpoints() -> None:
     assert jaws == [1.0, 0.9, 0.8, 0.7, 0.6]
     assert driver.reset(THERE).jaw_rad == THERE.jaw_rad
     assert followed(driver, THERE, 0.02).jaw_rad == THERE.jaw_rad
+
+
+def test_a_driver_that_takes_over_goes_on_as_the_one_before_would_have():
+    one, other = SimulatedDriver(0.01), SimulatedDriver(0.01)
+    one.reset(HOME)
+    seen = followed(one, THERE, 0.02)
+    assert other.resume(THERE, seen, 7) == seen
+    for _ in range(3):
+        assert other.measure(0.02) == one.measure(0.02)
+
+
+def test_noise_after_a_takeover_depends_on_the_tick_alone():
+    def noisy(tick):
+        driver = SimulatedDriver(0.01, noise_rad=1e-4, seed=3)
+        driver.resume(HOME, Measured(HOME.joints, STILL, HOME.jaw_rad), tick)
+        return driver.measure(0.02)
+
+    assert noisy(7) == noisy(7)
+    assert noisy(7) != noisy(8)
+
+
+def test_a_takeover_with_dead_time_stands_at_its_setpoint():
+    driver = SimulatedDriver(0.0, delay_s=0.05)
+    driver.resume(THERE, Measured(HOME.joints, STILL, HOME.jaw_rad), 7)
+    assert driver.measure(0.02).joints == THERE.joints

@@ -10,6 +10,7 @@ from fras_motion.controller import MotionController
 from fras_motion.kinematics import BASES_IN_WORLD
 from fras_motion.parameters import MotionParameters
 from fras_motion.states import Goal, Snapshot, Verdict
+from support import campaign
 
 PARAMETERS = MotionParameters(driver_time_constant_s=0.0)
 DT = PARAMETERS.dt_s
@@ -72,7 +73,9 @@ def drive(controller: MotionController, arm: str, until: int) -> tuple[list[Snap
     return snapshots, None
 
 
-@pytest.mark.parametrize(("arm", "stride"), [("psm1", 7), ("psm2", 16)])
+@pytest.mark.parametrize(
+    ("arm", "stride"), [("psm1", campaign.length(7, 16)), ("psm2", campaign.length(16, 37))]
+)
 def test_stop_in_any_phase_of_any_action(arm: str, stride: int) -> None:
     controller = MotionController(PARAMETERS, {arm: BASES_IN_WORLD[arm]})
     whole, _ = drive(controller, arm, -1)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from fras_planner.knowledge import load_knowledge
+from fras_planner.knowledge import AttachedRulesUnusable, attached_knowledge, load_knowledge
 from fras_planner.planning import Knowledge, KnowledgeFault, Planner, PlanningScene
 
 ASP = Path(__file__).resolve().parents[2] / "asp"
@@ -115,4 +115,47 @@ def test_knowledge_without_criteria_is_refused(copy: Path) -> None:
 def test_text_that_is_no_text_is_named(copy: Path) -> None:
     (copy / "goal.lp").write_bytes(b"\xff\xfe")
     with pytest.raises(KnowledgeFault, match="cannot be read"):
+        load_knowledge(copy)
+
+
+@pytest.mark.parametrize(
+    ("rule", "word"),
+    [
+        ('#include "/etc/hostname".', "include"),
+        ("#include <incmode>.", "include"),
+        ("% *% #include\t'x'.", "include"),
+        ("#script (lua)\n#end.", "script"),
+        ("# script(python)\n#end.", "script"),
+        ("#begin_lua\n#end_lua.", "begin_lua"),
+    ],
+)
+def test_rules_that_reach_beyond_their_folder_are_refused(
+    copy: Path, knowledge: Knowledge, rule: str, word: str
+) -> None:
+    """A log's own rules are run by whoever audits it: they get at no file and run no program."""
+    path = copy / "goal.lp"
+    line = path.read_text().count("\n") + 1
+    with path.open("a") as out:
+        out.write(rule + "\n")
+    with pytest.raises(KnowledgeFault, match=f"#{word} is not allowed") as caught:
+        load_knowledge(copy)
+    assert (caught.value.file, caught.value.line) == (str(path), line)
+    files = {**knowledge.files, "goal.lp": path.read_text()}
+    with pytest.raises(AttachedRulesUnusable, match=rf"a\.mcap.*asp/goal\.lp:{line}: #{word}"):
+        attached_knowledge(files, "a.mcap")
+
+
+def test_attached_rules_are_the_same_knowledge(knowledge: Knowledge) -> None:
+    attached = attached_knowledge(dict(sorted(knowledge.files.items(), reverse=True)), "a.mcap")
+    assert attached.files == knowledge.files
+    assert attached.digest == knowledge.digest
+    rest = {name: text for name, text in knowledge.files.items() if name != "effects.lp"}
+    with pytest.raises(AttachedRulesUnusable, match=r"a\.mcap.*asp/effects\.lp: this file is"):
+        attached_knowledge(rest, "a.mcap")
+
+
+def test_a_rule_that_puts_a_name_where_a_step_belongs_is_told(copy: Path) -> None:
+    with (copy / "history.lp").open("a") as file:
+        file.write("#program history.\nholds(visible_roi,soon).\n")
+    with pytest.raises(KnowledgeFault, match="not of its form"):
         load_knowledge(copy)

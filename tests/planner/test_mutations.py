@@ -55,6 +55,7 @@ HELD = "at(psm1,b(2,2)) in_hand(psm1,b(2,2)) closed_gripper(psm1)"
 HELD_FIXED = "at(psm1,b(1,1)) in_hand(psm1,b(1,1)) closed_gripper(psm1)"
 HELD_2 = "at(psm2,b(1,2)) in_hand(psm2,b(1,2)) closed_gripper(psm2)"
 SPANNED = "in_hand(psm1,b(1,1)) in_hand(psm1,b(2,1)) in_hand(psm1,b(2,2)) closed_gripper(psm1)"
+ALL_REJECTED = " ".join(f"rejected({name})" for name in NAMES)
 ALL = " ".join(f"tried({name})" for name in NAMES)
 
 # Scene, criterion, goal, most actions; and the states to plan for.
@@ -74,11 +75,17 @@ PLANS: tuple[tuple[PlanningScene, str, str, int, tuple[str, ...]], ...] = (
             f"{HELD_2} {HELD_FIXED}",
             f"{SPANNED} tried(b(2,1))",
             f"{SPANNED} tried(b(2,1)) tried(b(2,2))",
+            "rejected(b(3,3)) barred(psm2)",
+            f"{HELD} rejected(b(2,2))",
+            f"{HELD} barred(psm1)",
+            f"{SPANNED} rejected(b(2,2))",
             "visible_roi max_height(psm2)",
             "at(psm2,b(3,3))",
             "in_hand(psm1,b(1,2))",
             "ignore_ap tried(b(2,2)) max_height(psm2) closed_gripper(psm2)",
             ALL,
+            "barred(psm1) barred(psm2)",
+            ALL_REJECTED,
         ),
     ),
     (
@@ -169,6 +176,9 @@ QUESTIONS: tuple[tuple[PlanningScene, str, str, int, tuple[tuple[str, str], ...]
             ("b(1,1)", ""),
             ("b(2,2)", "tried(b(2,2))"),
             ("b(3,2)", "tried(b(3,3))"),
+            ("b(2,2)", "rejected(b(2,2))"),
+            ("b(2,1)", "barred(psm1)"),
+            ("b(2,2)", "barred(psm1)"),
             ("b(2,2)", "visible_roi"),
             ("b(3,3)", f"{HELD} {LIMIT}"),
             ("b(2,1)", "ignore_ap"),
@@ -218,8 +228,19 @@ def answers(knowledge: Knowledge) -> Iterator[object]:
     yield outcome(spent.why_not, "reach(psm2,b(3,3))", [])
 
 
+MANY = " ".join(f"rejected({name})" for name in NAMES[:6])
 # Why a plan is made, as the executive says it.
-REASONS = ("initial", "exposure", "force", "hold", "nothing_in_reach", "deviation: x", "late")
+REASONS = (
+    "initial",
+    "exposure",
+    "force",
+    "hold",
+    "restart",
+    "nothing_in_reach",
+    "deviation: x",
+    "rejected: x",
+    "late",
+)
 MEASURED = {
     "visible_roi": {"visible_fraction": 0.5, "threshold_fraction": 0.7},
     "max_height(psm1)": {"force_n": 0.4, "limit_n": 0.5},
@@ -230,7 +251,7 @@ def occasions(knowledge: Knowledge) -> Iterator[object]:
     """What is said of a plan because of when and upon what numbers it is made."""
     planner = Planner(knowledge, TISSUE)
     for reason in REASONS:
-        for state in ("", f"{HELD} {LIMIT}"):
+        for state in ("", f"{HELD} {LIMIT}", "rejected(b(3,3)) barred(psm2)", MANY):
             plan = planner.plan(state.split(), reason=reason, evidence=MEASURED)
             yield plan.explanation
 
@@ -265,6 +286,8 @@ HISTORIES: tuple[dict[int, str], ...] = (
     {1: "grasp(psm1,b(1,1)) at(psm1,b(1,1)) fixed(b(1,1))"},
     {1: "pull(psm1,b(1,1)) in_hand(psm1,b(1,1)) fixed(b(1,1))"},
     {1: "grasp(psm1,b(1,1)) at(psm1,b(1,1)) tried(b(1,1))"},
+    {1: "grasp(psm1,b(1,1)) at(psm1,b(1,1)) rejected(b(1,1))"},
+    {1: "grasp(psm1,b(1,1)) at(psm1,b(1,1)) barred(psm1)"},
     {1: "pull(psm1,b(1,1)) in_hand(psm1,b(1,1)) max_height(psm1)"},
     {1: "pull(psm1,b(1,1))"},
     {1: "move(psm1,b(1,1)) above_roi(b(1,1)) max_height(psm1)"},

@@ -6,10 +6,13 @@ from typing import Any
 
 import pytest
 
+from fras_common.digests import rules_digest
+from fras_planner.knowledge import AttachedRulesUnusable, load_knowledge
 from fras_planner.offline import BadContext, plan_file, read_contexts, verify_history
 from fras_planner.planning import UnknownAction, UnknownCriterion, UnknownFluent
 
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples" / "contexts.json"
+ROOT = Path(__file__).resolve().parents[2]
+EXAMPLES, ASP = ROOT / "examples" / "contexts.json", ROOT / "asp"
 CONTEXT: dict[str, Any] = {
     "names": ["b(1,1)", "b(1,2)"],
     "blocks_m": [[0, 0, 0], [0, 0.02, 0]],
@@ -125,6 +128,32 @@ def test_a_recorded_message_is_a_context() -> None:
 
 def test_a_history_is_verified_in_words() -> None:
     steps = {1: ["reach(psm1,b(1,1))", "closed_gripper(psm1)", *CONTEXT["fluents"]]}
-    assert verify_history(steps, None) == [
-        "step 1: psm1 reaches for b(1,1) with its gripper closed."
-    ]
+    judged = verify_history(steps)
+    assert judged.broken == ("step 1: psm1 reaches for b(1,1) with its gripper closed.",)
+    assert judged.ours
+    assert judged.asp_digest == judged.our_digest
+
+
+def test_the_specifications_attached_go_before_ours_and_those_asked_for_before_both() -> None:
+    steps = {1: ["reach(psm1,b(1,1))", "closed_gripper(psm1)", *CONTEXT["fluents"]]}
+    own = dict(load_knowledge().files)
+    words = own["verify.lp"].replace("with its gripper closed", "with its jaw shut")
+    attached = {**own, "verify.lp": words}
+    judged = verify_history(steps, None, attached, "a.mcap")
+    assert judged.broken == ("step 1: psm1 reaches for b(1,1) with its jaw shut.",)
+    assert judged.asp_digest == rules_digest(attached) != judged.our_digest
+    assert not judged.ours
+    # Other preferences promise the same.
+    same = verify_history(steps, None, {**own, "goal.lp": own["goal.lp"] + "% mine\n"}, "a.mcap")
+    assert same.ours
+    assert same.asp_digest != same.our_digest
+    asked = verify_history(steps, ASP, attached, "a.mcap")
+    assert asked.ours
+    assert asked.broken == ("step 1: psm1 reaches for b(1,1) with its gripper closed.",)
+
+
+def test_attached_rules_without_specifications_are_no_promise() -> None:
+    own = load_knowledge().files
+    rest = {name: text for name, text in own.items() if name != "verify.lp"}
+    with pytest.raises(AttachedRulesUnusable, match=r"a\.mcap.*verify\.lp: this file is missing"):
+        verify_history({1: ["reach(psm1,b(1,1))"]}, None, rest, "a.mcap")

@@ -9,11 +9,13 @@ import pytest
 
 from fras_planner.planning import Knowledge, Planner, PlanningScene
 from fras_planner.planning.program import TELL_FILES
+from support import campaign
 
 SceneMaker = Callable[..., PlanningScene]
 Block = tuple[int, int]
-# Random scenes by their number of blocks along a side: a thousand for each criterion.
-SCENES = {3: 600, 4: 200, 5: 60, 6: 40, 7: 30, 8: 25, 9: 25, 10: 20}
+# Random scenes by their number of blocks along a side: a thousand for each criterion, if whole.
+THOUSAND = {3: 600, 4: 200, 5: 60, 6: 40, 7: 30, 8: 25, 9: 25, 10: 20}
+SCENES = {n: campaign.length(scenes, scenes // 5) for n, scenes in THOUSAND.items()}
 CRITERIA = ("sum", "literal", "lex", "nearest", "weighted")
 
 

@@ -7,7 +7,7 @@ import pytest
 from fras_common.messages import Context
 from fras_common.scenario import PlannerSection, Scenario
 from fras_planner.adapter import PlanMaker
-from fras_planner.executive import PlanRequest
+from fras_planner.memory import PlanRequest
 from fras_planner.planning import Knowledge
 
 CONTEXT = Context(

@@ -154,11 +154,11 @@ def test_evidence_of_what_was_not_sensed_is_not_told(planner: Planner) -> None:
     ("reason", "sentence"),
     [
         ("exposure", "Planned anew: all actions of the plan before are done."),
-        ("hold", "Planned anew: a person stopped the arms and let them go again."),
+        ("hold", "Planned anew: the arms were stopped and let go again."),
         ("nothing_in_reach", "Planned anew: the jaw closed on nothing."),
         (
             "hold: at the door",
-            "Planned anew: a person stopped the arms and let them go again, at the door.",
+            "Planned anew: the arms were stopped and let go again, at the door.",
         ),
         ("slipped", "Planned anew: slipped."),
         (
@@ -336,14 +336,56 @@ def test_a_small_budget_gives_the_best_plan_so_far(
     knowledge: Knowledge, make_scene: SceneMaker
 ) -> None:
     unproved = 0
-    state = ["in_hand(psm1,b(1,1))", "closed_gripper(psm1)"]
     for seed in range(10):
         scene = make_scene(7, seed)
-        tried = scene.names[:24]
-        best = Planner(knowledge, scene).plan(state, tried=tried)
-        hasty = Planner(knowledge, scene, conflict_budget=2).plan(state, tried=tried)
+        tried = scene.names[:9]
+        best = Planner(knowledge, scene).plan([], tried=tried)
+        hasty = Planner(knowledge, scene, conflict_budget=1).plan([], tried=tried)
         if hasty.no_plan is None:
             assert hasty.actions[-1].name == "pull"
             assert hasty.cost >= best.cost
             unproved += not hasty.optimal
     assert unproved
+
+
+def test_what_a_person_rejected_is_told_and_not_grasped(planner: Planner) -> None:
+    first = planner.plan([])
+    again = planner.plan([], rejected=[first.target], reason="rejected: too near the vessel")
+    assert again.target
+    assert again.target != first.target
+    assert again.explanation[:2] == (
+        "Planned anew: a person rejected the plan before, too near the vessel.",
+        f"{first.target} is excluded: a person rejected it.",
+    )
+
+
+def test_a_barred_arm_grasps_nothing(planner: Planner) -> None:
+    first = planner.plan([])
+    again = planner.plan([], rejected=[first.arm], reason="rejected")
+    assert again.target
+    assert again.arm != first.arm
+    assert again.explanation[1] == f"{first.arm} is excluded: a person rejected it."
+
+
+def test_rejected_tissue_in_hand_is_let_go(planner: Planner) -> None:
+    state = ["in_hand(psm2,b(2,2))", "at(psm2,b(2,2))", "closed_gripper(psm2)"]
+    assert [action.name for action in planner.plan(state).actions] == ["pull"]
+    plan = planner.plan(state, rejected=["b(2,2)"])
+    assert [action.name for action in plan.actions] == ["release", "reach", "grasp", "pull"]
+    assert plan.target != "b(2,2)"
+    assert "psm2 lets go of b(2,2): a person has excluded it." in plan.explanation
+
+
+def test_everything_rejected_leaves_no_plan_and_says_so(
+    planner: Planner, scene: PlanningScene
+) -> None:
+    none = planner.plan([], rejected=scene.names, reason="rejected: no").no_plan
+    assert none is not None
+    assert "heed_rejection" in none.core
+    assert "Rule: What a person has excluded is not grasped." in none.sentences
+    assert "A person has excluded 4 of the 4 blocks that an arm reaches." in none.sentences
+
+
+def test_why_not_a_rejected_block(planner: Planner) -> None:
+    answer = planner.why_not("b(2,2)", [], rejected=["b(2,2)"])
+    assert answer.sentences == ("b(2,2) is excluded: a person rejected it.",)

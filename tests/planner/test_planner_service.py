@@ -7,7 +7,10 @@ from typing import Any
 import pytest
 
 from fras_common.codec import content_digest
+from fras_common.digests import rules_digest
+from fras_common.errors import FrasError
 from fras_common.messages import (
+    ActionResult,
     OpenRequest,
     RecorderStatus,
     ResetReply,
@@ -16,7 +19,14 @@ from fras_common.messages import (
     TaskStatus,
 )
 from fras_common.scenario import RunSection, Scenario, resolve
-from fras_common.topics import MOTION_RESET, RECORDER_OPEN, RECORDER_STATUS, TASK, TASK_STATUS
+from fras_common.topics import (
+    ACTION_RESULT,
+    MOTION_RESET,
+    RECORDER_OPEN,
+    RECORDER_STATUS,
+    TASK,
+    TASK_STATUS,
+)
 from fras_planner.service import PlannerService
 from support.shells import ShellBench
 
@@ -105,6 +115,16 @@ def test_health_tells_which_knowledge_is_used(bench: Bench) -> None:
     assert len(bench.host.facts["asp_digest"]) == 64
 
 
+def test_the_log_gets_the_rules_that_health_tells_of(bench: Bench) -> None:
+    opened: list[Any] = []
+    bench.client.serve(RECORDER_OPEN, opened.append)
+    bench.task(scenario=SCENARIO)
+    bench.run_until(lambda: opened)
+    rules = opened[0].request.rules
+    assert {"domain.lp", "verify.lp", "preferences/lex.lp"} <= set(rules)
+    assert rules_digest(rules) == bench.host.facts["asp_digest"]
+
+
 def disk_full() -> RecorderStatus:
     return RecorderStatus(
         trial="t", state="error", path="", messages=0, bytes=0, lost=0, reason="disk full"
@@ -115,10 +135,44 @@ def test_log_that_can_not_be_written_ends_the_trial(bench: Bench) -> None:
     bench.answer_recorder()
     bench.client.serve(MOTION_RESET, lambda call: None)  # the trial stays in its reset
     bench.task(scenario=SCENARIO)
-    bench.client.publisher(RECORDER_STATUS).put(disk_full())
+    bench.peers(RECORDER_STATUS).put(disk_full())
     bench.run_until(lambda: bench.statuses[-1].phase == "idle")
     assert bench.statuses[-1].outcome == "aborted"
     assert bench.statuses[-1].reason == "hold:recorder: disk full"
+
+
+def recorder_starts() -> RecorderStatus:
+    return RecorderStatus(trial="", state="idle", path="", messages=0, bytes=0, lost=0, reason="")
+
+
+def test_a_recorder_that_starts_anew_is_asked_to_go_on_with_the_log(bench: Bench) -> None:
+    bench.answer_recorder()
+    bench.client.serve(MOTION_RESET, lambda call: None)  # the trial stays in its reset
+    bench.task(scenario=SCENARIO, out_dir="/somewhere")
+    bench.run_until(lambda: bench.statuses)
+    asked: list[Any] = []
+    bench.client.serve(RECORDER_OPEN, asked.append)
+    recorder = bench.peers(RECORDER_STATUS)
+    recorder.put(recorder_starts())
+    bench.run_until(lambda: asked)
+    assert (asked[0].request.trial, asked[0].request.directory) == ("t", "/somewhere")
+    # And one that can't do it ends the trial.
+    asked[0].fail(FrasError("another log is in the way"))
+    bench.run_until(lambda: bench.statuses[-1].phase == "idle")
+    assert "hold:recorder: " in bench.statuses[-1].reason
+    assert "another log is in the way" in bench.statuses[-1].reason
+
+
+def test_a_recorder_that_starts_while_no_log_is_open_is_left_alone(bench: Bench) -> None:
+    asked: list[Any] = []
+    bench.client.serve(RECORDER_OPEN, asked.append)
+    bench.peers(RECORDER_STATUS).put(recorder_starts())
+    bench.task(scenario=SCENARIO)
+    bench.peers(RECORDER_STATUS).put(recorder_starts())
+    bench.run_until(lambda: asked)
+    while bench.host.drain(0.05):
+        pass
+    assert len(asked) == 1
 
 
 def test_a_trial_that_needs_no_log_goes_on_without(bench: Bench) -> None:
@@ -128,6 +182,27 @@ def test_a_trial_that_needs_no_log_goes_on_without(bench: Bench) -> None:
     run = RunSection(peer_timeout_s=0.2, require_log=False)
     bench.task(scenario=resolve(Scenario(run=run)))
     bench.run_until(lambda: waiting)
-    bench.client.publisher(RECORDER_STATUS).put(disk_full())
+    bench.peers(RECORDER_STATUS).put(disk_full())
     bench.settle()
     assert bench.statuses[-1].phase == "resetting"
+
+
+def test_a_result_that_nobody_awaits_is_kept_for_a_while_and_drives_nothing(bench: Bench) -> None:
+    """One called "" was taken for an answer while none was awaited; found by the fuzz."""
+    asked: list[Any] = []
+    bench.client.serve(RECORDER_OPEN, asked.append)  # never answered: the executive waits for it
+    bench.task(scenario=SCENARIO)
+    before = list(bench.statuses)
+    results = bench.client.publisher(ACTION_RESULT)
+    for number in range(100):
+        for goal_id in ("", f"g{number}"):
+            results.put(
+                ActionResult(
+                    trial="t", goal_id=goal_id, name="reach", arm="psm1", block="b(1,1)",
+                    outcome="succeeded", reason="",
+                )
+            )  # fmt: skip
+        bench.settle()
+    assert (len(asked), bench.statuses) == (1, before)
+    (ended,) = bench.task(command="abort", trial="t")
+    assert ended.accepted

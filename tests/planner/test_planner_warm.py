@@ -9,11 +9,12 @@ import pytest
 
 from fras_planner.planning import Knowledge, Plan, Planner, PlanningScene
 from fras_planner.planning.program import Program
+from support import campaign
 from support.planning import random_state
 
 SceneMaker = Callable[..., PlanningScene]
-# Random states in all: 2 criteria, 2 goals, 20 scenes each, 25 states in each of them.
-SCENES, STATES = 20, 25
+# In all: 2 criteria, 2 goals, 20 scenes each, so many random states in each of them.
+SCENES, STATES = 20, campaign.length(25, 6)
 
 
 def outcome(plan: Plan) -> tuple[object, ...]:

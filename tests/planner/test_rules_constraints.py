@@ -7,7 +7,8 @@ from planner.mutants import models
 
 GIVEN = (
     "#defined target/2. #defined occurs/3. #defined reachable/2. #defined avoided/1."
-    "#defined tried/1. #defined in_hand/2. #defined closed_gripper/1. #defined untried/1."
+    "#defined tried/1. #defined rejected/1. #defined barred/1. #defined wanted/1."
+    "#defined in_hand/2. #defined closed_gripper/1. #defined untried/1."
     "#defined clean/2. #defined in_hand/3. #defined closed_gripper/2. #defined max_height/2."
     "arm(psm1;psm2). "
 )
@@ -17,6 +18,7 @@ NAMES = (
     "end_below_limit",
     "keep_off_attachments",
     "try_once",
+    "heed_rejection",
     "respect_limit",
     "pull_before_moving",
     "open_gripper_first",
@@ -56,6 +58,19 @@ def test_rule_and_enforced(knowledge: Knowledge) -> None:
             id="reach-try_once",
         ),
         pytest.param(
+            TWO + "rejected(b(1,2)).",
+            "forbidden(reach(psm1,b(1,2)),heed_rejection) candidate(b(1,1))",
+            "forbidden(reach(psm1,b(1,1)),heed_rejection) candidate(b(1,2))",
+            id="reach-rejected",
+        ),
+        pytest.param(
+            TWO + "reachable(psm2,b(1,2)). barred(psm1).",
+            "forbidden(reach(psm1,b(1,1)),heed_rejection)"
+            " forbidden(reach(psm1,b(1,2)),heed_rejection) candidate(b(1,2))",
+            "forbidden(reach(psm2,b(1,2)),heed_rejection) candidate(b(1,1))",
+            id="reach-barred",
+        ),
+        pytest.param(
             TWO, "candidate(b(1,1)) candidate(b(1,2))", "candidate(b(2,2))", id="candidate"
         ),
         pytest.param(
@@ -67,18 +82,27 @@ def test_rule_and_enforced(knowledge: Knowledge) -> None:
         pytest.param(
             HELD,
             "forbidden(pull,psm1,try_once,1) forbidden(move,psm1,try_once,1)",
-            "forbidden(pull,psm2,try_once,1) forbidden(pull,psm1,keep_off_attachments,1)",
+            "forbidden(pull,psm2,try_once,1) forbidden(pull,psm1,keep_off_attachments,1)"
+            " forbidden(pull,psm1,heed_rejection,1)",
             id="try_once",
         ),
         pytest.param(
             HELD + "untried(psm1).",
+            "forbidden(pull,psm1,heed_rejection,1) forbidden(move,psm1,heed_rejection,1)",
+            "forbidden(pull,psm1,try_once,1) forbidden(pull,psm2,heed_rejection,1)"
+            " forbidden(pull,psm1,keep_off_attachments,1)",
+            id="heed_rejection",
+        ),
+        pytest.param(
+            HELD + "untried(psm1). wanted(psm1).",
             "forbidden(pull,psm1,keep_off_attachments,1)"
             " forbidden(move,psm1,keep_off_attachments,1)",
-            "forbidden(pull,psm1,try_once,1) forbidden(pull,psm2,keep_off_attachments,1)",
+            "forbidden(pull,psm1,try_once,1) forbidden(pull,psm2,keep_off_attachments,1)"
+            " forbidden(pull,psm1,heed_rejection,1)",
             id="keep_off_attachments",
         ),
         pytest.param(
-            HELD + "untried(psm1). clean(psm1,b(1,1)).",
+            HELD + "untried(psm1). wanted(psm1). clean(psm1,b(1,1)).",
             "",
             "forbidden(pull,psm1,try_once,1) forbidden(pull,psm1,keep_off_attachments,1)",
             id="clean_tissue",
@@ -136,7 +160,9 @@ def test_forbidden(knowledge: Knowledge, facts: str, expected: str, absent: str)
         (TWO + "avoided(b(1,1)). ", "target(psm1,b(1,1)).", "keep_off_attachments"),
         (TWO + "tried(b(1,1)). ", "target(psm1,b(1,1)).", "try_once"),
         (HELD, "occurs(pull,psm1,1).", "try_once"),
-        (HELD + "untried(psm1). ", "occurs(pull,psm1,1).", "keep_off_attachments"),
+        (TWO + "rejected(b(1,1)). ", "target(psm1,b(1,1)).", "heed_rejection"),
+        (HELD + "untried(psm1). ", "occurs(pull,psm1,1).", "heed_rejection"),
+        (HELD + "untried(psm1). wanted(psm1). ", "occurs(pull,psm1,1).", "keep_off_attachments"),
         ("max_height(psm1,1). ", "occurs(pull,psm1,1).", "respect_limit"),
         ("", "occurs(move,psm1,1).", "pull_before_moving"),
         ("closed_gripper(psm1,1). ", "occurs(grasp,psm1,1).", "open_gripper_first"),

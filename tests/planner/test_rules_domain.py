@@ -20,6 +20,8 @@ DECLARED = {
         "max_height(arm)",
         "visible_roi",
         "tried(block)",
+        "rejected(block)",
+        "barred(arm)",
     },
     "option": {"ignore_ap"},
     "action": {
@@ -48,6 +50,8 @@ def test_signature(knowledge: Knowledge, kind: str) -> None:
         ("max_height", 1, 2),
         ("visible_roi", 0, 1),
         ("tried", 1, 2),
+        ("rejected", 1, 2),
+        ("barred", 1, 2),
         ("ignore_ap", 0, 1),
     ],
 )
@@ -65,6 +69,23 @@ def test_external(knowledge: Knowledge, name: str, arity: int, instances: int) -
         pytest.param("", "avoided(b(1,1))", "avoided(b(1,2))", id="avoided"),
         pytest.param("ignore_ap.", "", "avoided(b(1,1))", id="avoided-ignore_ap"),
         pytest.param("in_hand(psm1,b(1,1)).", "untried(psm1)", "untried(psm2)", id="untried"),
+        pytest.param("in_hand(psm1,b(1,2)).", "wanted(psm1)", "wanted(psm2)", id="wanted"),
+        pytest.param(
+            "in_hand(psm1,b(1,2)). rejected(b(1,2)).",
+            "untried(psm1)",
+            "wanted(psm1) clean(psm1,b(1,2))",
+            id="wanted-rejected",
+        ),
+        pytest.param(
+            "in_hand(psm1,b(1,2)). barred(psm1).",
+            "untried(psm1)",
+            "wanted(psm1)",
+            id="wanted-barred",
+        ),
+        pytest.param("in_hand(psm1,b(1,2)). tried(b(1,2)).", "", "wanted(psm1)", id="wanted-tried"),
+        pytest.param(
+            "in_hand(psm1,b(1,1)).", "wanted(psm1)", "clean(psm1,b(1,1))", id="wanted-avoided"
+        ),
         pytest.param(
             "in_hand(psm1,b(1,1)). tried(b(1,1)).", "", "untried(psm1)", id="untried-tried"
         ),

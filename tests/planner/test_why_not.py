@@ -216,6 +216,8 @@ def test_the_other_arm_and_one_action_more(knowledge: Knowledge) -> None:
         ("b(x,y)", UnknownAction, "b(i,j)"),
         ("b(0+1,1)", UnknownAction, "b(i,j)"),
         ("pull(psm1,", UnknownAction, "move(arm,block)"),
+        ("\u202e\U0001f600", UnknownAction, "b(i,j)"),
+        ("b(1,1)\0", UnknownAction, "b(i,j)"),
         ("pull(psm3,b(1,1))", UnknownArm, "psm1, psm2"),
         ("pull(psm1,b(9,9))", UnknownBlock, "b(1,1)"),
     ],

@@ -18,6 +18,7 @@ from fras_sa.awareness import (
     TissueModel,
     TissueView,
 )
+from support import campaign
 from support.slow_awareness import (
     LX,
     LY,
@@ -92,7 +93,7 @@ def random_tissue(rng, tick, nodes):
     return TissueView(tick, nodes, force, tools, converged=bool(rng.random() < 0.9))
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(campaign.length(20, 7)))
 def test_fast_and_slow_agree_on_random_states(box, seed):
     rng = np.random.default_rng(seed)
     n, model, limits = random_scene(rng, box)

@@ -2,7 +2,9 @@
 
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import meshio
@@ -10,6 +12,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from fras_cli import mesh_input
 from fras_cli.mesh_input import MeshCheckFailed
 from fras_cli.options import TrialInput, build_trial, write_new_scenario
 from fras_common.scenario import (
@@ -35,6 +38,23 @@ def write_mesh(path: Path, cell: Cell = "hex8", size_m: Any = (0.08, 0.1, 0.006)
     """A box in millimetres, somewhere."""
     nodes_m, elements = box(cell, (4, 5, 1), size_m)
     meshio.Mesh(1000.0 * nodes_m + SHIFT_MM, [(THEIRS[cell], elements)]).write(path)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def asked_once() -> Iterator[None]:
+    """Ask the simulator's own command about each mesh once, not once a test."""
+    answers: dict[Any, subprocess.CompletedProcess[bytes]] = {}
+
+    def run(command: list[str], **options: Any) -> subprocess.CompletedProcess[bytes]:
+        question = (*command, options["input"])
+        if question not in answers:
+            answers[question] = subprocess.run(command, **options)
+        return answers[question]
+
+    commands = SimpleNamespace(run=run, TimeoutExpired=subprocess.TimeoutExpired)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(mesh_input, "subprocess", commands)
+        yield
 
 
 @pytest.fixture

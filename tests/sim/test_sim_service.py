@@ -19,6 +19,7 @@ from fras_common.messages import (
     TissueState,
 )
 from fras_common.scenario import Disc, Scenario, SceneSection, TissueSection
+from fras_common.service.rates import TOLD_AT_ONCE
 from fras_common.topics import (
     FAULT,
     ROBOT_STATE,
@@ -97,6 +98,16 @@ def test_each_tick_once_in_order_and_the_same_answer_again(bench: Bench) -> None
     bench.put(5)
     assert len(bench.states) == 3
     assert bench.host.counts["gaps"] >= 1
+
+
+def test_ticks_out_of_order_are_all_counted_and_few_are_logged(bench: Bench) -> None:
+    bench.reset()
+    bench.host.clock = lambda: 0.0
+    with capture_logs() as logs:
+        for _ in range(TOLD_AT_ONCE + 50):
+            bench.put(7)
+    assert bench.host.counts["gaps"] == TOLD_AT_ONCE + 50
+    assert [log["event"] for log in logs] == ["tick out of order, not stepped"] * TOLD_AT_ONCE
 
 
 def test_state_of_another_trial_is_no_tick(bench: Bench) -> None:

@@ -2,9 +2,11 @@
 
 import sys
 
+from fras_common.signals import silent_interrupt
 from fras_common.threads import one_thread
 
 
+@silent_interrupt()
 def main(argv: list[str] | None = None) -> int:
     """Run the service."""
     one_thread()

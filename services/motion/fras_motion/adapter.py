@@ -8,9 +8,10 @@ from fras_common import messages as m
 from fras_common.messages.motion import ActionOutcome
 from fras_common.messages.robot import Joints
 from fras_common.scenario import Scenario
+from fras_motion.kinematics import Pose
 from fras_motion.parameters import MotionParameters
 from fras_motion.safety import Box
-from fras_motion.states import ActionResult, ArmState, Goal, Snapshot, Verdict
+from fras_motion.states import ActionResult, ActionState, ArmState, Goal, Snapshot, Verdict
 
 
 def parameters_of(scenario: Scenario) -> MotionParameters:
@@ -116,4 +117,37 @@ def _arm_state(arm: ArmState) -> m.ArmState:
         setpoint_joints=cast(Joints, tuple(arm.setpoint_joints)),
         setpoint_jaw_rad=arm.setpoint_jaw_rad,
         operating_state=arm.operating_state,  # type: ignore[arg-type]
+        grasp_height_m=arm.grasp_height_m,
+        hard_latched=arm.hard_latched,
+    )
+
+
+def snapshot_of(state: m.RobotState) -> Snapshot:
+    """Read the robot at one tick, as another process told it."""
+    action = state.action
+    return Snapshot(
+        tick=state.tick,
+        arms={name: _arm_of(arm) for name, arm in state.arms.items()},
+        action=ActionState(
+            action.goal_id, action.name, action.arm, action.block or None, action.phase
+        )
+        if action is not None
+        else None,
+        holds=dict(state.holds),
+        verdict_tick=state.verdict_tick,
+    )
+
+
+def _arm_of(arm: m.ArmState) -> ArmState:
+    tip = arm.tip_in_world
+    return ArmState(
+        joints=arm.joints,
+        joint_velocities=arm.joint_velocities,
+        tip_in_world=Pose(tip.position_m, tip.quaternion_xyzw),
+        jaw_rad=arm.jaw_rad,
+        setpoint_joints=arm.setpoint_joints,
+        setpoint_jaw_rad=arm.setpoint_jaw_rad,
+        operating_state=arm.operating_state,
+        grasp_height_m=arm.grasp_height_m,
+        hard_latched=arm.hard_latched,
     )

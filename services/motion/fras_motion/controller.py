@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 from itertools import product
 
-from fras_common.errors import FrasError
 from fras_motion.drivers import Driver, DriverFault, Measured, Setpoint
 from fras_motion.kinematics import (
     BASES_IN_WORLD,
@@ -82,34 +81,73 @@ class MotionController:
         Snapshot
             The robot at tick 0.
         """
-        self._setpoints = dict(self._home)
+        self._stand(self._home)
         self._measured = {
             name: self._drivers[name].reset(setpoint) for name, setpoint in self._home.items()
         }
-        self._tips = {
-            name: self.arms[name].forward(setpoint.joints)
-            for name, setpoint in self._setpoints.items()
-        }
-        self._instruments = {
-            name: self.arms[name].instrument(setpoint.joints, self._tips[name])
-            for name, setpoint in self._setpoints.items()
-        }
         self._grasp_heights: dict[str, float] = {}
-        self._course: Course | None = None
         self._latched: set[str] = set()
         self._last = self._observe(0, None, -1)
         return self.snapshot
+
+    def take_over(self, before: Snapshot) -> None:
+        """Stand where another controller stood that is no more; what it did is over.
+
+        Parameters
+        ----------
+        before : Snapshot
+            The last that it told.
+
+        Raises
+        ------
+        InvalidParameter
+            It had other arms.
+        DriverFault
+            An arm does not stand there.
+        """
+        if before.arms.keys() != self.arms.keys():
+            raise InvalidParameter("arms", sorted(before.arms), f"{sorted(self.arms)}")
+        setpoints = {
+            name: Setpoint(arm.setpoint_joints, arm.setpoint_jaw_rad)
+            for name, arm in before.arms.items()
+        }
+        for name, arm in before.arms.items():
+            measured = Measured(arm.joints, arm.joint_velocities, arm.jaw_rad)
+            driver = self._drivers[name]
+            self._measured[name] = driver.resume(setpoints[name], measured, before.tick)
+        self._stand(setpoints)
+        self._grasp_heights = {
+            name: arm.grasp_height_m
+            for name, arm in before.arms.items()
+            if arm.grasp_height_m is not None
+        }
+        self._latched = {name for name, arm in before.arms.items() if arm.hard_latched}
+        self._last = replace(before, action=before.action and before.action.ended())
+
+    def _stand(self, setpoints: Mapping[str, Setpoint]) -> None:
+        """Be at rest at setpoints."""
+        self._setpoints = dict(setpoints)
+        self._tips = {name: self.arms[name].forward(one.joints) for name, one in setpoints.items()}
+        self._instruments = {
+            name: self.arms[name].instrument(one.joints, self._tips[name])
+            for name, one in setpoints.items()
+        }
+        self._course: Course | None = None
 
     @property
     def snapshot(self) -> Snapshot:
         """The robot at its last tick, with the holds of now."""
         course, last = self._course, self._last
+        state = "PAUSED" if self._holds else "ENABLED"
         action = last.action
         if course is not None and course.stopped and self._holds:
-            action = _action(course.goal, "held")
+            action = course.goal.in_phase("held")
         return replace(
             last,
-            arms={name: self._with_operating_state(arm) for name, arm in last.arms.items()},
+            arms={
+                name: replace(arm, operating_state=state, hard_latched=name in self._latched)
+                for name, arm in last.arms.items()
+            },
             action=action,
             holds=dict(sorted(self._holds.items())),
         )
@@ -204,7 +242,7 @@ class MotionController:
         if course is None:
             return None
         self._course = None
-        self._last = replace(self._last, action=_action(course.goal, "interrupted"))
+        self._last = replace(self._last, action=course.goal.in_phase("interrupted"))
         return Ending("aborted", reason).result(course.goal, self._last.tick)
 
     def expect(self, tick: int) -> None:
@@ -262,7 +300,7 @@ class MotionController:
             progress = replace(progress, phase="interrupted", ending=ending)
         self._remember_grasp(course.goal.arm)
         tick = self._last.tick + 1
-        self._last = self._observe(tick, _action(course.goal, progress.phase), verdict.tick)
+        self._last = self._observe(tick, course.goal.in_phase(progress.phase), verdict.tick)
         result = None
         if progress.ending is not None:
             result = progress.ending.result(course.goal, tick)
@@ -322,9 +360,9 @@ class MotionController:
             for gate in self._gates.values():
                 gate(step, self._bounds)
         except GateRefused as fault:
-            return _refused(before, fault.gate, fault)
+            return Progress.refused(before, fault.gate, fault)
         except Unreachable as fault:
-            return _refused(before, "unreachable", fault)
+            return Progress.refused(before, "unreachable", fault)
         self._setpoints[name], self._tips[name] = step.after, step.tip_after
         self._instruments[name] = step.instrument_after
         return progress
@@ -342,9 +380,6 @@ class MotionController:
     def _closed(self, measured: Measured) -> bool:
         return measured.jaw_rad < self._parameters.jaw_closed_below_rad
 
-    def _with_operating_state(self, arm: ArmState) -> ArmState:
-        return replace(arm, operating_state="PAUSED" if self._holds else "ENABLED")
-
     def _observe(self, tick: int, action: ActionState | None, verdict_tick: int) -> Snapshot:
         arms = {
             name: ArmState(
@@ -355,17 +390,8 @@ class MotionController:
                 setpoint_joints=self._setpoints[name].joints,
                 setpoint_jaw_rad=self._setpoints[name].jaw_rad,
                 operating_state="ENABLED",
+                grasp_height_m=self._grasp_heights.get(name),
             )
             for name, measured in self._measured.items()
         }
         return Snapshot(tick, arms, action, {}, verdict_tick)
-
-
-def _refused(before: Setpoint, name: str, fault: FrasError) -> Progress:
-    """Stand where the arm stands, and say by name and numbers why."""
-    ending = Ending("aborted", f"gate:{name}", str(fault), fault.values)
-    return Progress(before, "interrupted", ending, name)
-
-
-def _action(goal: Goal, phase: str) -> ActionState:
-    return ActionState(goal.goal_id, goal.name, goal.arm, goal.block, phase)

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from fras_common.errors import FrasError
 from fras_motion.drivers import Setpoint
 from fras_motion.safety import Reaction, force_relieved, required_reaction
 from fras_motion.trajectory import brake, retreat
@@ -74,6 +75,12 @@ class Progress:
     phase: str
     ending: Ending | None
     refused_by: str = ""
+
+    @classmethod
+    def refused(cls, before: Setpoint, name: str, fault: FrasError) -> Progress:
+        """Stand where the arm stands, and say by name and numbers why."""
+        ending = Ending("aborted", f"gate:{name}", str(fault), fault.values)
+        return cls(before, "interrupted", ending, name)
 
 
 class Course:

@@ -19,12 +19,25 @@ UNREADABLE: Final = "unreadable"
 LOG: Final = "recorder"
 """Holder of motion's own hold, while the log of a trial that demands one is not being written."""
 
-_OURS: Final = (CANCELLER, RESTART, UNREADABLE, LOG)
+PAGE: Final = "monitor:page"
+"""Holder of motion's own hold, since nobody looked at a page in a supervised trial: for a person to
+lift, who does."""
+
+_OURS: Final = (CANCELLER, RESTART, UNREADABLE, LOG, PAGE)
 _OURS_BEGIN: Final = ("arms/", "crtk/")
+
+
+MAX_HOLDS: Final = 64
+HOLDER_LENGTH: Final = 80
+REASON_LENGTH: Final = 400
+"""Holds stand in each robot state. A stop is taken whatever it is called, and told shortened."""
+OTHERS: Final = "others"
+"""Holder of all the holds for which there is no place any more."""
 
 
 def clients_name(holder: str) -> str:
     """Name under which a client's hold stands: one of motion's own would be lifted by software."""
+    holder = holder[:HOLDER_LENGTH]
     ours = holder in _OURS or holder.startswith(_OURS_BEGIN)
     return f"client:{holder}" if ours else holder
 
@@ -58,8 +71,12 @@ class Holds:
     def hold(self, holder: str, reason: str) -> dict[str, str]:
         """Add a hold; returns all that are in force."""
         with self._lock:
-            self._reasons[holder] = reason
             self._made += 1
+            if self._restored and self._reasons.get(holder) == reason:
+                # Told already; who repeats it without end tells nobody anything.
+                self._last = (holder, reason)
+                return dict(self._reasons)
+            self._reasons[holder] = reason
             self._last = (holder, reason)
             return self._changed()
 
@@ -97,8 +114,14 @@ class Holds:
             return self._changed()
 
     def hold_for_client(self, holder: str, reason: str) -> dict[str, str]:
-        """Add a hold that came in from outside, see `clients_name`."""
-        return self.hold(clients_name(holder), reason)
+        """Add a hold that came in from outside, see `clients_name`.
+
+        Beyond `MAX_HOLDS` it stands among `others`: a stop is never refused.
+        """
+        name, held = clients_name(holder), self.current()
+        if name not in held and len(held) >= MAX_HOLDS:
+            name = OTHERS
+        return self.hold(name, reason[:REASON_LENGTH])
 
     def resume_for_client(self, holder: str, by: str) -> dict[str, str]:
         """Lift a hold for someone outside, who speaks for no hold of motion's own; see `resume`.

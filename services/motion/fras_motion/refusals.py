@@ -8,7 +8,8 @@ from fras_motion.errors import Refused
 
 def refusal(host: ServiceHost, goal_id: str, error: Refused) -> ExecuteReply:
     """Count a refusal, and make the reply that the mirror of the query puts on the bus."""
-    host.log.warning("goal refused", goal=goal_id, problem=str(error))
+    about = f"goal {error.reason}"
+    host.tell(about, "warning", "goal refused", goal=goal_id, problem=str(error))
     host.refusals[error.reason] += 1
     return ExecuteReply(
         accepted=False, reason=error.reason, text=str(error), values=in_words(error.values)

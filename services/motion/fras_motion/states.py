@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from fras_motion.kinematics import Joints, Pose, Vector3
 
@@ -16,6 +16,10 @@ __all__ = [
     "Snapshot",
     "Verdict",
 ]
+
+
+# Of the last tick of an action.
+_FINAL_PHASES = ("done", "interrupted")
 
 
 @dataclass(frozen=True)
@@ -41,6 +45,10 @@ class Goal:
     arm: str
     block: str | None = None
     target_m: Vector3 | None = None
+
+    def in_phase(self, phase: str) -> ActionState:
+        """Tell the action as it is in a phase."""
+        return ActionState(self.goal_id, self.name, self.arm, self.block, phase)
 
 
 @dataclass(frozen=True)
@@ -90,6 +98,10 @@ class ArmState:
         As last sent.
     operating_state : str
         CRTK: ENABLED, or PAUSED while somebody holds the arms.
+    grasp_height_m : float or None
+        Height of the tip when the jaw closed [m]; None while it is open.
+    hard_latched : bool
+        Whether the arm crossed the hard limit and has not released since.
     """
 
     joints: Joints
@@ -99,6 +111,8 @@ class ArmState:
     setpoint_joints: Joints
     setpoint_jaw_rad: float
     operating_state: str
+    grasp_height_m: float | None = None
+    hard_latched: bool = False
 
 
 @dataclass(frozen=True)
@@ -120,6 +134,11 @@ class ActionState:
     arm: str
     block: str | None
     phase: str
+
+    def ended(self) -> ActionState:
+        """Tell the action as one that does not go on."""
+        over = self.phase in _FINAL_PHASES
+        return self if over else replace(self, phase="interrupted")
 
 
 @dataclass(frozen=True)

@@ -1,14 +1,14 @@
 """One trial's worth of motion: its goals, taken until it is cancelled, and what holds the arms."""
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 from fras_motion.controller import MotionController
 from fras_motion.drivers import Driver
 from fras_motion.errors import Refused
-from fras_motion.holds import CANCELLER, Holds
+from fras_motion.holds import CANCELLER, RESTART, Holds
 from fras_motion.parameters import MotionParameters
-from fras_motion.states import ActionResult, Advance, Goal, Verdict
+from fras_motion.states import ActionResult, Advance, Goal, Snapshot, Verdict
 
 
 class MotionTrial:
@@ -41,6 +41,7 @@ class MotionTrial:
         self._holds = holds
         self._refusals = refusals
         self._open = True
+        self._used: set[str] = set()
         _, self._holds_made, _ = holds.look()
         self.impose_holds()
 
@@ -48,6 +49,11 @@ class MotionTrial:
     def runs(self) -> bool:
         """Whether it may still move the arms; nobody else does then."""
         return self._open or self.goal is not None
+
+    @property
+    def has_moved(self) -> bool:
+        """Whether anything was done that a new beginning would undo."""
+        return self.tick > 0 or self.goal is not None or not self._open
 
     @property
     def tick(self) -> int:
@@ -60,12 +66,43 @@ class MotionTrial:
         Raises
         ------
         Refused
-            The goal is of another trial or of one that was cancelled, or motion can't do it.
+            The goal is of another trial or of one that was cancelled, or was taken before, or
+            motion can't do it.
         """
         if trial != self.name or not self._open:
             raise Refused("another_trial", f"{trial!r}; motion serves {self.name!r}", trial=trial)
+        if RESTART in self._holds.current():
+            text = f"motion started again at tick {self.tick}: lift the hold {RESTART!r} first"
+            raise Refused("restart", text, tick=self.tick)
+        self.require_new(goal)
         self.controller.execute(goal)
         self.goal = goal
+        self._used.add(goal.goal_id)
+
+    def require_new(self, goal: Goal) -> None:
+        """Refuse a goal that was taken before: a request of then may be sent again at any time.
+
+        Raises
+        ------
+        Refused
+        """
+        if goal.goal_id in self._used:
+            text = f"{goal.goal_id!r} was taken before in this trial: a new goal has a new id"
+            raise Refused("goal_used", text, goal_id=goal.goal_id)
+
+    def resume(self, before: Snapshot, used: Collection[str] = ()) -> None:
+        """Take the trial up where another process left it; raises as the controller does.
+
+        Parameters
+        ----------
+        before : Snapshot
+            The last that it told.
+        used : collection of str
+            Goals that it had taken.
+        """
+        self.controller.take_over(before)
+        self._used.update(used)
+        self.impose_holds()
 
     def advance(self, verdict: Verdict) -> Advance:
         """Do one tick, and count what intervened in it."""

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Mapping
 from fras_common import messages as m
 from fras_common.errors import FrasError
 from fras_common.scenario import Scenario
-from fras_planner.executive import PlanRequest
+from fras_planner.memory import PlanRequest
 from fras_planner.planning import (
     Context,
     Knowledge,
@@ -59,6 +59,7 @@ class PlanMaker:
             context.fluents,
             ignore_ap=request.ignore_ap,
             tried=request.tried,
+            rejected=request.rejected,
             reason=request.reason,
             evidence=context.evidence,
         )
@@ -72,6 +73,7 @@ class PlanMaker:
             asp_digest=self._knowledge.digest,
             ignore_ap=request.ignore_ap,
             tried=list(request.tried),
+            rejected=list(request.rejected),
             actions=_actions(plan),
             target=plan.target,
             arm=plan.arm,
@@ -86,6 +88,10 @@ class PlanMaker:
             else None,
         )
 
+    def recall(self, plan: m.Plan, context: m.Context) -> None:
+        """Take what another planner decided last; raises as a call does."""
+        self(context, PlanRequest.of(plan))
+
     def why_not(self, question: str) -> m.WhyNotReply:
         """Say why the latest plan is not another one.
 
@@ -99,7 +105,9 @@ class PlanMaker:
         if self._planner is None or self._latest is None:
             raise NothingPlanned(NOTHING_PLANNED)
         context, request = self._latest
-        answer = self._planner.why_not(question, context.fluents, request.ignore_ap, request.tried)
+        answer = self._planner.why_not(
+            question, context.fluents, request.ignore_ap, request.tried, request.rejected
+        )
         return m.WhyNotReply(
             question=answer.question,
             trial=context.trial,

@@ -9,11 +9,15 @@ from fras_common.topics import Query
 
 @dataclass(frozen=True)
 class Ask:
-    """Ask `query`; sends back the reply, throws `RemoteFault` or `NoAnswer`."""
+    """Ask `query`; sends back the reply, throws `RemoteFault` or `NoAnswer`.
+
+    A patient one is asked again while the service that serves it is away.
+    """
 
     query: Query[Any, Any]
     request: Any
     timeout_s: float
+    is_patient: bool = True
 
 
 @dataclass(frozen=True)
@@ -21,6 +25,13 @@ class AwaitResult:
     """Wait for the end of an action; sends back its `ActionResult`."""
 
     goal_id: str
+
+
+@dataclass(frozen=True)
+class AwaitDecision:
+    """Wait, for as long as it takes, for a person's word on a plan; sends back `PlanDecision`."""
+
+    plan: str
 
 
 @dataclass(frozen=True)
@@ -35,4 +46,4 @@ class Accept:
     """The trial has begun and its log is open: answer whoever started it."""
 
 
-Effect = Ask | AwaitResult | Say | Accept
+Effect = Ask | AwaitResult | AwaitDecision | Say | Accept

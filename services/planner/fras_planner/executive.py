@@ -5,30 +5,27 @@ the goal is reached is knowledge and stands in `asp/`; here stands only the orde
 the bookkeeping of section "Pull, move, re-plan": which blocks have been tried.
 """
 
-from collections.abc import Callable, Generator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Generator, Mapping, Sequence
 from typing import Any
 
 import msgspec
 
 from fras_common.bus import NoAnswer
-from fras_common.codec import content_digest
 from fras_common.errors import FrasError
 from fras_common.executed import history_step
 from fras_common.messages import (
     ActionResult,
-    CancelReply,
-    CancelRequest,
     CloseRequest,
     Context,
     ContextRequest,
+    DoneAction,
     ExecuteReply,
     ExecuteRequest,
     OpenRequest,
     Plan,
+    PlanDecision,
     PlannedAction,
     ResetReply,
-    ResetRequest,
     TargetReply,
     TargetRequest,
     TaskRequest,
@@ -36,76 +33,31 @@ from fras_common.messages import (
 )
 from fras_common.scenario import Scenario
 from fras_common.topics import (
-    CANCEL,
     EXECUTE,
-    MOTION_RESET,
-    RECORDER_CLOSE,
     RECORDER_OPEN,
     SA_CONTEXT,
-    SA_RESET,
     SA_TARGET,
-    SIM_RESET,
 )
-from fras_planner.deviation import first_deviation
-from fras_planner.effects import Accept, Ask, AwaitResult, Effect, Say
+from fras_planner.approval import Proposal, rejected, rejection
+from fras_planner.beginning import compare, log_request, reset_all
+from fras_planner.effects import Accept, Ask, AwaitDecision, AwaitResult, Effect, Say
+from fras_planner.endings import (
+    RESTART,
+    ActionAborted,
+    Ended,
+    PeerLost,
+    is_failure,
+    kind_with,
+    reason_to_replan,
+)
+from fras_planner.memory import PlanRequest, Resumption, first_status, planned
+from fras_planner.requests import close_log, leave_motion, lift_restart
 from fras_planner.tried import Held, newly_tried
-
-RESET_TIMEOUT_S = 60.0
-CLOSE_TIMEOUT_S = 15.0
 
 MakePlan = Callable[[Context, "PlanRequest"], Plan]
 # Says which safety specifications a history breaks: for each step what held, and what was done.
 Verify = Callable[[dict[int, list[str]]], list[str]]
 Steps = Generator[Effect, Any, Any]
-
-
-class PlanRequest(msgspec.Struct, frozen=True, kw_only=True):
-    """What a plan depends on beside the context."""
-
-    request_id: str
-    reason: str
-    ignore_ap: bool
-    tried: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Ended:
-    """An action that ended, and what is true now; no result if motion refused it."""
-
-    action: PlannedAction
-    result: ActionResult | None
-    refusal: str
-    context: Context
-
-
-def reason_to_replan(ended: Ended) -> str:
-    """Return why an action's end asks for a new plan, or nothing."""
-    result = ended.result
-    if result is None:
-        return f"refused: {ended.refusal}"
-    if result.outcome == "interrupted":
-        return "hold" if result.reason == "hold" else "force"
-    if result.outcome == "failed":
-        return result.reason
-    return first_deviation(ended.action, ended.context.monitored)
-
-
-class TaskAborted(FrasError):
-    """Someone ended the trial; thrown into the executive at whatever it waits for."""
-
-
-class ActionAborted(FrasError):
-    """Motion gave an action up, and with it the trial."""
-
-
-class PeerLost(FrasError):
-    """A service that the executive waits for has gone."""
-
-    service: str
-
-
-class DigestMismatch(FrasError):
-    """A service understood the scenario differently."""
 
 
 class Executive:
@@ -120,38 +72,46 @@ class Executive:
         The planner core, on messages.
     verify : callable
         The verifier, on what was done.
+    rules : mapping of str to str
+        The rule files that both go by, for the log.
+    resumed : Resumption, optional
+        What one of before has left of this trial; without it the trial begins.
+
+    Attributes
+    ----------
+    proposal : Proposal or None
+        The plan that waits for a person's decision, while `AwaitDecision` does.
     """
 
     def __init__(
-        self, request: TaskRequest, scenario: Scenario, make_plan: MakePlan, verify: Verify
+        self,
+        request: TaskRequest,
+        scenario: Scenario,
+        make_plan: MakePlan,
+        verify: Verify,
+        rules: Mapping[str, str],
+        resumed: Resumption | None = None,
     ) -> None:
         self._request = request
         self._scenario = scenario
         self._make_plan = make_plan
         self._verify = verify
-        self._done: dict[int, list[str]] = {}
+        self._rules = rules
+        self._resumed = resumed
         self._timeout_s = scenario.run.peer_timeout_s
-        self._status = TaskStatus(
-            trial=request.trial,
-            phase="resetting",
-            action="",
-            goal_id="",
-            tried=[],
-            plans=0,
-            replans=0,
-            scenario_kind="A",
-            actions=[],
-            outcome="",
-            reason="",
-            violations=[],
-        )
-        self._held: Held | None = None
-        self._goals = 0
-        self._contexts = 0
-        self._last_tick = 0
-        self._log_open = False
-        self._moved = False
-        self._ending = False
+        self._status = resumed.status if resumed is not None else first_status(request.trial)
+        status = self._status
+        self._done = {one.goal: one for one in status.done}
+        self._history: dict[int, list[str]] = {}
+        self._held = Held(status.held, status.held_ignored_ap) if status.held else None
+        self._goals = status.goals
+        self._contexts = status.contexts
+        self._followed = status.plan
+        self._last_tick = max(0, status.tick)
+        self._log_open = self._moved = resumed is not None
+        self._ending = status.phase == "ended"
+        self._lost = ""
+        self.proposal: Proposal | None = None
 
     @property
     def status(self) -> TaskStatus:
@@ -163,44 +123,67 @@ class Executive:
         """Whether the trial is over and only has to be put in order; it can't be aborted twice."""
         return self._ending
 
+    @property
+    def log_request(self) -> OpenRequest:
+        """What opens the log; asked again of a recorder that took the place of another."""
+        return log_request(self._request, self._scenario, self._rules)
+
+    @property
+    def log_open(self) -> bool:
+        """Whether a recorder has opened the log."""
+        return self._log_open
+
     def run(self) -> Steps:
-        """Begin, loop, end, and close the log; whatever happens, the end is said."""
-        yield from self._say()
-        try:
-            yield from self._open_log()
-            yield Accept()
-            yield from self._reset()
-            outcome, reason = yield from self._retract()
-        except PeerLost as error:
-            outcome, reason = "aborted", f"hold:{error.service}"
-        except NoAnswer as error:
-            outcome, reason = "aborted", f"hold:{error.key.partition('/')[0]}"
-        except FrasError as error:
-            outcome, reason = "aborted", str(error)
-        self._ending = True
+        """Begin or go on, loop, end, and close the log; whatever happens, the end is said."""
+        seq = yield from self._say()
         failures: list[FrasError] = []
-        yield from self._leave_motion(failures)
-        seq = yield from self._say(
-            phase="ended",
-            action="",
-            goal_id="",
-            outcome=outcome,
-            reason=reason,
-            violations=self._verify(self._done),
-        )
+        if not self._ending:
+            outcome, reason = yield from self._until_named()
+            self._ending = True
+            yield from self._leave_motion(failures)
+            seq = yield from self._say(
+                phase="ended",
+                action="",
+                goal_id="",
+                outcome=outcome,
+                reason=reason,
+                violations=self._verified(),
+            )
         yield from self._close_log(seq, failures)
         yield from self._say(phase="idle")
         if failures:
             raise failures[0]
 
+    def _until_named(self) -> Steps:
+        """Do everything until the trial has an outcome and a reason."""
+        try:
+            yield from self._begin()
+            return (yield from self._retract())
+        except PeerLost as error:
+            self._lost = error.service
+        except NoAnswer as error:
+            self._lost = error.key.partition("/")[0]
+        except FrasError as error:
+            return "aborted", str(error)
+        return "aborted", f"hold:{self._lost}"
+
+    def _verified(self) -> list[str]:
+        """Say what was broken, as far as can be told after a restart."""
+        if self._resumed is not None:
+            self._history = {**self._resumed.history(self._done.values()), **self._history}
+        unknown = len(self._done) - len(self._history)
+        told = [f"{unknown} actions are not remembered and can't be verified"] if unknown else []
+        return [*self._verify(dict(sorted(self._history.items()))), *told]
+
     def _leave_motion(self, failures: list[FrasError]) -> Steps:
-        """Have motion forget the trial: no goal of it moves the arms any more."""
         if not self._moved:
             return
-        request = CancelRequest(trial=self._request.trial, reason="the trial has ended")
+        # One that is gone for good was waited for already.
+        is_patient = self._lost != "motion"
+        trial = self._request.trial
         try:
-            reply: CancelReply = yield Ask(CANCEL, request, self._timeout_s)
-            self._last_tick = max(self._last_tick, reply.tick)
+            tick = yield from leave_motion(trial, self._timeout_s, is_patient=is_patient)
+            self._last_tick = max(self._last_tick, tick)
         except FrasError as error:
             failures.append(error)
 
@@ -212,62 +195,63 @@ class Executive:
             trial=self._request.trial, last_tick=self._last_tick, status_seq=status_seq
         )
         try:
-            yield Ask(RECORDER_CLOSE, closing, CLOSE_TIMEOUT_S)
+            yield from close_log(closing, self.log_request)
         except FrasError as error:
             failures.append(error)
 
     # --- beginning ------------------------------------------------------------------------
 
-    def _open_log(self) -> Steps:
-        request = self._request
-        opening = OpenRequest(
-            trial=request.trial,
-            scenario=self._scenario,
-            mesh=request.mesh,
-            directory=request.out_dir,
-        )
-        reply: ResetReply = yield Ask(RECORDER_OPEN, opening, self._timeout_s)
-        self._log_open = True
-        self._compare(reply, "recorder")
-
-    def _reset(self) -> Steps:
-        request = self._request
-        reset = ResetRequest(trial=request.trial, scenario=self._scenario, mesh=request.mesh)
-        for query in (MOTION_RESET, SIM_RESET, SA_RESET):
-            self._moved = self._moved or query is MOTION_RESET
-            reply: ResetReply = yield Ask(query, reset, RESET_TIMEOUT_S)
-            self._compare(reply, query.server)
-
-    def _compare(self, reply: ResetReply, service: str) -> None:
-        request = self._request
-        expected = content_digest(request.trial, self._scenario, request.mesh)
-        if reply.digest != expected:
-            raise DigestMismatch(
-                f"{service} read another scenario (digest {reply.digest[:12]}, expected "
-                f"{expected[:12]}): do all services run the same version?",
-                service=service,
-            )
+    def _begin(self) -> Steps:
+        resumed = self._resumed
+        request, scenario = self._request, self._scenario
+        if resumed is None:
+            reply: ResetReply = yield Ask(RECORDER_OPEN, self.log_request, self._timeout_s)
+            self._log_open = True
+            compare(request, scenario, reply, "recorder")
+        elif resumed.request is None:
+            raise PeerLost("how the trial began is not remembered", service="planner")
+        if resumed is None or resumed.status.phase == "resetting":
+            yield Accept()
+            self._moved = True
+            yield from reset_all(request, scenario)
 
     # --- the loop -------------------------------------------------------------------------
 
     def _retract(self) -> Steps:
-        ignore_ap = self._scenario.planner.ignore_ap
-        reason = "initial"
-        context = yield from self._context()
+        ignore_ap = self._scenario.planner.ignore_ap and not self._status.plans
+        reason = RESTART if self._status.plans else "initial"
+        waits: Proposal | None = None
+        if self._resumed is not None and self._resumed.started:
+            ended: Ended = yield from self._end_of_goal(self._resumed)
+            context = ended.context
+            reason = reason_to_replan(ended) or reason
+        elif self._resumed is not None and self._resumed.proposal is not None:
+            waits = self._resumed.proposal
+            context = waits.context
+        else:
+            context = yield from self._context()
         while True:
-            plan = yield from self._plan(context, reason, ignore_ap)
-            if plan.no_plan is not None:
-                return "no_plan", "; ".join(plan.no_plan.sentences)
-            if not plan.actions:
-                return "success", "the region of interest is visible"
-            if not (yield from self._may_follow(plan, reason)):
-                return "failed", "replans"
-            planned_with_ignore_ap, ignore_ap = ignore_ap, False
+            if waits is None:
+                plan = yield from self._plan(context, reason, ignore_ap)
+                if plan.no_plan is not None:
+                    return "no_plan", "; ".join(plan.no_plan.sentences)
+                if not plan.actions:
+                    return "success", "the region of interest is visible"
+                if not (yield from self._may_follow(plan, reason)):
+                    return "failed", "replans"
+            else:
+                plan, waits = waits.plan, None
+            ignore_ap = False
+            if self._scenario.planner.confirm:
+                decided: PlanDecision = yield from self._decision(plan, context)
+                if not decided.approved:
+                    context, reason = (yield from self._context()), rejection(decided)
+                    continue
             reason = "exposure"
             for action in plan.actions:
-                ended: Ended = yield from self._act(action, plan, context)
+                ended = yield from self._act(action, plan, context)
                 context = ended.context
-                self._remember(ended, planned_with_ignore_ap)
+                self._remember(ended, plan.ignore_ap)
                 if deviation := reason_to_replan(ended):
                     reason = deviation
                     break
@@ -290,9 +274,11 @@ class Executive:
             reason=reason,
             ignore_ap=ignore_ap,
             tried=tuple(self._status.tried),
+            rejected=rejected(self._status),
         )
         plan = self._make_plan(context, request)
         yield Say(plan)
+        self._followed = plan.request_id
         yield from self._say(plans=self._status.plans + 1)
         return plan
 
@@ -300,18 +286,29 @@ class Executive:
         """Count a later plan, and what kind of trial it makes this; False if it is one too many."""
         if self._status.plans == 1:
             return True
-        # A stop that a person lifted is no failure of the plan.
-        replans = self._status.replans + (reason != "hold")
+        replans = self._status.replans + is_failure(reason)
         if replans > self._scenario.planner.max_replans:
             return False
-        names = {action.name for action in plan.actions}
         kind = self._status.scenario_kind
-        if "release" in names:
-            kind = "C"
-        elif "move" in names and kind == "A":
-            kind = "B"
+        if not self._scenario.planner.confirm:
+            kind = kind_with(kind, plan)
         yield from self._say(replans=replans, scenario_kind=kind)
         return True
+
+    def _decision(self, plan: Plan, context: Context) -> Steps:
+        """Wait until a person has approved or rejected a plan; nothing moves meanwhile."""
+        yield from self._say(phase="awaiting_approval", action="", goal_id="")
+        self.proposal = Proposal(plan, context)
+        try:
+            decided: PlanDecision = yield AwaitDecision(plan.request_id)
+        finally:
+            self.proposal = None
+        kind = self._status.scenario_kind
+        if decided.approved and self._status.plans > 1:
+            kind = kind_with(kind, plan)
+        decisions = [*self._status.decisions, decided]
+        yield from self._say(phase="planning", decisions=decisions, scenario_kind=kind)
+        return decided
 
     def _act(self, action: PlannedAction, plan: Plan, before: Context) -> Steps:
         arm, block = action.args[0], action.args[1] if len(action.args) > 1 else ""
@@ -329,21 +326,58 @@ class Executive:
             target_m=target.position_m,
         )
         reply: ExecuteReply = yield Ask(EXECUTE, goal, self._timeout_s)
+        if reply.reason == "another_trial":
+            raise PeerLost("motion serves the trial no more", service="motion")
         if not reply.accepted:
+            if reply.reason == RESTART:
+                yield from lift_restart(self._timeout_s)
             context = yield from self._context()
             return Ended(action, None, reply.reason, context)
-        self._done[self._goals] = history_step(action.text, before, plan)
+        self._note_done(action.text, before.request_id)
+        self._history[self._goals] = history_step(action.text, before, plan)
         result: ActionResult = yield AwaitResult(goal_id)
-        self._last_tick = result.tick
-        yield from self._say(actions=[*self._status.actions, action.text])
+        yield from self._say_done(action.text, result)
+        return (yield from self._after(action, result))
+
+    def _end_of_goal(self, resumed: Resumption) -> Steps:
+        """Await the end of the action that an executive of before has begun."""
+        status = resumed.status
+        plan = resumed.plans.get(status.plan)
+        action = planned(plan, status.action)
+        is_known = status.goals in self._done
+        if not is_known:
+            self._note_done(action.text, f"c{status.contexts}")
+        result: ActionResult = yield AwaitResult(status.goal_id)
+        if is_known:
+            self._last_tick = max(self._last_tick, result.tick)
+        else:
+            yield from self._say_done(action.text, result)
+        ended: Ended = yield from self._after(action, result)
+        self._remember(ended, plan is not None and plan.ignore_ap)
+        return ended
+
+    def _note_done(self, action: str, context: str) -> None:
+        self._done[self._goals] = DoneAction(
+            goal=self._goals, action=action, context=context, plan=self._followed
+        )
+
+    def _say_done(self, action: str, result: ActionResult) -> Steps:
+        self._last_tick = max(self._last_tick, result.tick)
+        yield from self._say(actions=[*self._status.actions, action])
+
+    def _after(self, action: PlannedAction, result: ActionResult) -> Steps:
         if result.outcome == "aborted":
             # Its last tick may never be judged; nothing is asked about it.
             raise ActionAborted(result.reason)
+        if result.reason == RESTART:
+            yield from lift_restart(self._timeout_s)
         context = yield from self._context(action.expected)
         return Ended(action, result, "", context)
 
     def _remember(self, ended: Ended, ignored_ap: bool) -> None:
         action, result = ended.action, ended.result
+        if ended.by_restart:
+            return
         tried = newly_tried(action, result, ended.context.fluents, self._held)
         fresh = [block for block in tried if block not in self._status.tried]
         self._status = msgspec.structs.replace(self._status, tried=[*self._status.tried, *fresh])
@@ -354,6 +388,17 @@ class Executive:
                 self._held = None
 
     def _say(self, **changes: Any) -> Steps:
-        self._status = msgspec.structs.replace(self._status, tick=self._last_tick, **changes)
+        held = self._held
+        self._status = msgspec.structs.replace(
+            self._status,
+            tick=self._last_tick,
+            goals=self._goals,
+            contexts=self._contexts,
+            plan=self._followed,
+            held=held.block if held is not None else "",
+            held_ignored_ap=held is not None and held.ignored_ap,
+            done=list(self._done.values()),
+            **changes,
+        )
         stamped: TaskStatus = yield Say(self._status)
         return stamped.seq

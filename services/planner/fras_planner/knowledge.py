@@ -1,13 +1,30 @@
 """Reads the rule files: from the package, from a checkout, or from where the user says."""
 
-import hashlib
+import re
+from collections.abc import Mapping
 from pathlib import Path
 
+from fras_common.digests import rules_digest
+from fras_common.errors import FrasError
 from fras_planner.planning import Knowledge, KnowledgeFault, Planner, PlanningScene
 
 _HERE = Path(__file__).resolve().parent
 # Wheels carry the rules inside the package; a checkout has them at its root.
 _PLACES = (_HERE / "asp", _HERE.parents[2] / "asp")
+# In comments, too: what is a comment is clingo's to say, and rules may come from anywhere.
+_OUTSIDE = re.compile(r"#\s*(include|script|begin_lua|begin_python)\b")
+
+
+class AttachedRulesUnusable(FrasError):
+    """Rules that came with a log and that can't be used."""
+
+    def __init__(self, log: str, fault: KnowledgeFault) -> None:
+        place = f"{fault.file}:{fault.line}" if fault.line else fault.file
+        super().__init__(
+            f"{log}: the rules attached to it can't be used: {place}: {fault.message}; give others "
+            "with --asp-dir",
+            log=log,
+        )
 
 
 def load_knowledge(asp_dir: Path | None = None) -> Knowledge:
@@ -35,13 +52,43 @@ def load_knowledge(asp_dir: Path | None = None) -> Knowledge:
             files[name] = path.read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError) as error:
             raise KnowledgeFault(str(path), 0, f"cannot be read: {error}") from error
-    digest = hashlib.sha256()
+    return _checked(files, str(folder))
+
+
+def attached_knowledge(files: Mapping[str, str], log: str) -> Knowledge:
+    """Check rules that were attached to a log, and make knowledge of them.
+
+    Parameters
+    ----------
+    files : mapping of str to str
+        Text by path below `asp/`.
+    log : str
+        Where they come from, for messages.
+
+    Raises
+    ------
+    AttachedRulesUnusable
+    """
+    try:
+        return _checked(files, "asp")
+    except KnowledgeFault as error:
+        raise AttachedRulesUnusable(log, error) from error
+
+
+def _checked(files: Mapping[str, str], origin: str) -> Knowledge:
     for name, text in files.items():
-        for part in (name.encode(), text.encode()):
-            digest.update(len(part).to_bytes(8, "little") + part)
-    knowledge = Knowledge(files, digest.hexdigest(), origin=str(folder))
+        _refuse_outside(f"{origin}/{name}", text)
+    knowledge = Knowledge(files, rules_digest(files), origin=origin)
     _try_out(knowledge)
     return knowledge
+
+
+def _refuse_outside(file: str, text: str) -> None:
+    """Refuse what reaches beyond the files: no digest covers it, and no log holds it."""
+    if found := _OUTSIDE.search(text):
+        line = text.count("\n", 0, found.start()) + 1
+        problem = f"#{found[1]} is not allowed: all rules stand in the folder"
+        raise KnowledgeFault(file, line, problem)
 
 
 def _try_out(knowledge: Knowledge) -> None:
@@ -52,4 +99,9 @@ def _try_out(knowledge: Knowledge) -> None:
     statics = ["reachable(psm1,b(1,1))", "fixed(b(1,2))", "above_roi(b(1,2))"]
     scene = PlanningScene.make(names, rows, (0.0, 0.01, 0.0), statics)
     for criterion in knowledge.criteria:
-        Planner(knowledge, scene, criterion).plan([])
+        try:
+            Planner(knowledge, scene, criterion).plan([])
+        except (RuntimeError, ValueError, LookupError) as error:
+            # clingo's, where a name stands in place of a number, or the other way round.
+            problem = f"a plan by {criterion} can't be told: an atom is not of its form ({error})"
+            raise KnowledgeFault(knowledge.origin, 0, problem) from error

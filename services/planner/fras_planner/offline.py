@@ -2,14 +2,24 @@
 
 import time
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
 from fras_common.errors import FrasError
-from fras_planner.knowledge import load_knowledge
-from fras_planner.planning import Context, Knowledge, Plan, Planner, PlanningScene, WhyNot, verify
+from fras_planner.knowledge import AttachedRulesUnusable, attached_knowledge, load_knowledge
+from fras_planner.planning import (
+    Context,
+    Knowledge,
+    KnowledgeFault,
+    Plan,
+    Planner,
+    PlanningScene,
+    WhyNot,
+    verify,
+)
 
 Vector = tuple[float, float, float]
 
@@ -28,6 +38,7 @@ class ContextFile(msgspec.Struct, frozen=True, kw_only=True):
     fixed_points_m: list[Vector] = []
     ignore_ap: bool = False
     tried: list[str] = []
+    rejected: list[str] = []
     reason: str = "initial"
     evidence: dict[str, dict[str, float]] = {}
 
@@ -60,7 +71,7 @@ def read_contexts(text: bytes | str, place: str) -> tuple[list[Context], bool]:
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
         raise BadContext(
             f"{place}: {error}; a context has names, blocks_m, roi_m [m] and fluents, and may have "
-            "fixed_points_m, tried, ignore_ap, evidence and reason",
+            "fixed_points_m, tried, rejected, ignore_ap, evidence and reason",
             place=place,
             problem=str(error),
         ) from error
@@ -73,6 +84,7 @@ def read_contexts(text: bytes | str, place: str) -> tuple[list[Context], bool]:
             fixed_points_m=tuple(file.fixed_points_m),
             ignore_ap=file.ignore_ap,
             tried=tuple(file.tried),
+            rejected=tuple(file.rejected),
             reason=file.reason,
             evidence=file.evidence,
         )
@@ -105,7 +117,7 @@ class OfflinePlanner:
         PlanningError
         """
         planner = self._planner_for(context)
-        given = (context.fluents, context.ignore_ap, context.tried)
+        given = (context.fluents, context.ignore_ap, context.tried, context.rejected)
         row = plain(planner.plan(*given, reason=context.reason, evidence=context.evidence))
         row["why_not"] = [plain(planner.why_not(question, *given)) for question in questions]
         return row
@@ -167,11 +179,65 @@ def plain(result: Plan | WhyNot) -> dict[str, Any]:
     return row
 
 
-def verify_history(history: Mapping[int, Iterable[str]], asp_dir: Path | None) -> list[str]:
-    """Say in words which safety specifications a history breaks.
+@dataclass(frozen=True)
+class Judgement:
+    """What became of holding a history against safety specifications.
+
+    Attributes
+    ----------
+    broken : tuple of str
+        Those that it breaks, in words.
+    asp_digest : str
+        Of the rules with the specifications.
+    ours : bool
+        Whether their `verify.lp` is the one that came with this FRAS.
+    our_digest : str
+        Of the rules that came with it.
+    """
+
+    broken: tuple[str, ...]
+    asp_digest: str
+    ours: bool
+    our_digest: str
+
+
+def verify_history(
+    history: Mapping[int, Iterable[str]],
+    asp_dir: Path | None = None,
+    attached: Mapping[str, str] | None = None,
+    log: str = "",
+) -> Judgement:
+    """Hold a history against the safety specifications.
+
+    Parameters
+    ----------
+    history : mapping of int to iterable of str
+    asp_dir : Path, optional
+        Whose specifications; they go before all others.
+    attached : mapping of str to str, optional
+        Rules that came with a log; without any, those that came with FRAS.
+    log : str
+        Where the attached ones come from, for messages.
 
     Raises
     ------
-    KnowledgeFault, UnknownFluent
+    KnowledgeFault, AttachedRulesUnusable, UnknownFluent
     """
-    return [violation.sentence for violation in verify(load_knowledge(asp_dir), history)]
+    own = load_knowledge()
+    is_attached = asp_dir is None and bool(attached)
+    if is_attached:
+        knowledge = attached_knowledge(attached or {}, log)
+    else:
+        knowledge = own if asp_dir is None else load_knowledge(asp_dir)
+    try:
+        found = verify(knowledge, history)
+    except KnowledgeFault as error:
+        if is_attached:
+            raise AttachedRulesUnusable(log, error) from error
+        raise
+    return Judgement(
+        broken=tuple(violation.sentence for violation in found),
+        asp_digest=knowledge.digest,
+        ours=knowledge.files.get("verify.lp") == own.files["verify.lp"],
+        our_digest=own.digest,
+    )

@@ -1,15 +1,38 @@
 """Performs the effects of an executive on a real bus, one at a time."""
 
 from collections.abc import Callable, Generator
+from dataclasses import dataclass
 from typing import Any
 
-from fras_common.bus import Publisher
+from fras_common.bus import NoAnswer, Publisher
 from fras_common.errors import FrasError
 from fras_common.messages import ActionResult, Plan, TaskStatus
 from fras_common.service import ServiceHost
-from fras_planner.effects import Accept, Ask, AwaitResult, Effect, Say
+from fras_planner.effects import Accept, Ask, AwaitDecision, AwaitResult, Effect, Say
 
 Steps = Generator[Effect, Any, Any]
+
+# One action is under way at a time; what nobody awaits is kept no longer than that.
+RESULTS = 16
+AGAIN_S = 0.25
+TOLD_AFTER_S = 0.5
+
+
+@dataclass
+class _Unanswered:
+    """A question whose server is away.
+
+    Attributes
+    ----------
+    since_s : float
+        When it was found to be; nothing before it was asked again is lost.
+    again_s : float
+        When to ask again.
+    """
+
+    ask: Ask
+    since_s: float
+    again_s: float
 
 
 class Performer:
@@ -24,6 +47,8 @@ class Performer:
         What `Accept` means.
     on_end : callable
         Called once, when the coroutine has ended, with the error that ended it or None.
+    clock : callable
+        Returns monotonic seconds: for how long a service that was asked may be away.
     """
 
     def __init__(
@@ -33,28 +58,67 @@ class Performer:
         statuses: Publisher[TaskStatus],
         on_accept: Callable[[], None],
         on_end: Callable[[FrasError | None], None],
+        clock: Callable[[], float],
     ) -> None:
         self._host = host
         self._plans = plans
         self._statuses = statuses
         self._on_accept = on_accept
         self._on_end = on_end
+        self._clock = clock
+        self._patience_s = 0.0
+        self._unanswered: _Unanswered | None = None
         self._steps: Steps | None = None
         self._turn = 0
         self._results: dict[str, ActionResult] = {}
         self.awaited = ""
 
-    def start(self, steps: Steps) -> None:
-        """Begin a coroutine."""
+    def start(
+        self, steps: Steps, patience_s: float = 0.0, result: ActionResult | None = None
+    ) -> None:
+        """Begin a coroutine.
+
+        Parameters
+        ----------
+        steps : Steps
+        patience_s : float
+            For how long a service may be away before a question to it fails.
+        result : ActionResult, optional
+            One that has come already.
+        """
         self._steps = steps
-        self._results.clear()
+        self._patience_s = patience_s
+        self._results = {result.goal_id: result} if result is not None else {}
         self.awaited = ""
         self.drive(None)
+
+    @property
+    def missing(self) -> str:
+        """The service that is away though it was asked; empty if none is."""
+        away = self._unanswered
+        if away is None or self._clock() - away.since_s < TOLD_AFTER_S:
+            return ""
+        return away.ask.query.server
+
+    def wake(self) -> float | None:
+        """Ask again what is due; return the seconds until the next time, or None."""
+        away = self._unanswered
+        if away is None:
+            return None
+        now_s = self._clock()
+        if now_s < away.again_s:
+            return away.again_s - now_s
+        away.again_s = now_s + away.ask.timeout_s + AGAIN_S
+        self._ask(away.ask)
+        return None
 
     def deliver(self, result: ActionResult) -> None:
         """Take the end of an action; it may come before it is waited for."""
         self._results[result.goal_id] = result
-        if self.awaited == result.goal_id:
+        while len(self._results) > RESULTS:
+            del self._results[next(iter(self._results))]
+        # Nothing is awaited as "": a result may be called so.
+        if self.awaited and self.awaited == result.goal_id:
             self.drive(self._take_result())
 
     def drive(self, outcome: Any) -> None:
@@ -62,6 +126,7 @@ class Performer:
         while self._steps is not None:
             self._turn += 1
             self.awaited = ""
+            self._unanswered = None
             try:
                 if isinstance(outcome, FrasError):
                     effect = self._steps.throw(outcome)
@@ -83,16 +148,18 @@ class Performer:
                     if goal_id not in self._results:
                         return
                     outcome = self._take_result()
+                case AwaitDecision():
+                    return
                 case Ask():
                     self._ask(effect)
                     return
 
     def _ask(self, ask: Ask) -> None:
-        turn = self._turn
+        turn, asked_s = self._turn, self._clock()
 
         def resume(outcome: Any) -> None:
             # An abort may have gone on meanwhile; then this answer comes too late.
-            if turn == self._turn:
+            if turn == self._turn and not self._may_wait(ask, outcome, asked_s):
                 self.drive(outcome)
 
         self._host.bus.ask(
@@ -101,6 +168,19 @@ class Performer:
             lambda outcome: self._host.post(lambda: resume(outcome)),
             ask.timeout_s,
         )
+
+    def _may_wait(self, ask: Ask, outcome: Any, asked_s: float) -> bool:
+        """Whether a question is to be asked again: who serves it is away, and not for too long."""
+        now_s = self._clock()
+        # One that is there and does not answer had all the time that it was given.
+        is_away = isinstance(outcome, NoAnswer) and now_s - asked_s < ask.timeout_s
+        if not (is_away and ask.is_patient):
+            return False
+        since_s = self._unanswered.since_s if self._unanswered is not None else asked_s
+        if now_s - since_s >= self._patience_s:
+            return False
+        self._unanswered = _Unanswered(ask, since_s, now_s + AGAIN_S)
+        return True
 
     def _publish(self, message: Plan | TaskStatus) -> Plan | TaskStatus:
         if isinstance(message, Plan):

@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from fras_common.messages import ActionResult, PlannedAction
+from fras_planner.endings import NO_FAILURE
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ def newly_tried(
         return []
     if result is None:
         return _in_grip(action.args[0], held, holds)
-    if result.outcome == "failed" or result.reason == "hold":
+    if result.outcome == "failed" or result.reason in NO_FAILURE:
         return []
     hopeless = held.ignored_ap or f"fixed({held.block})" in holds
     in_vain = "visible_roi" not in holds and (

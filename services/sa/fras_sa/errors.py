@@ -34,3 +34,14 @@ class OtherTrial(FrasError):
 
     def __init__(self, asked: str, watched: str) -> None:
         super().__init__(f"asked about trial {asked!r}, watching {watched!r}: reset first")
+
+
+class LostMoment(FrasError):
+    """The states of the last tick judged can't be recalled, and with them what SA remembers."""
+
+    def __init__(self, tick: int) -> None:
+        super().__init__(
+            f"the recorder does not remember the states of tick {tick}, which was judged last: "
+            "the trial can't go on",
+            tick=tick,
+        )

@@ -18,15 +18,23 @@ class Moment:
 
 
 class TickJoin:
-    """Hands out each tick once, in order, as soon as both of its states are there."""
+    """Hands out each tick once, in order, as soon as both of its states are there.
 
-    def __init__(self) -> None:
-        self._next = 0
+    Parameters
+    ----------
+    first : int
+        The tick to begin with.
+    """
+
+    def __init__(self, first: int = 0) -> None:
+        self._next = first
         self._tissues: dict[int, TissueState] = {}
         self._robots: dict[int, RobotState] = {}
 
     def add(self, state: TissueState | RobotState) -> None:
-        """Keep a state until its tick is complete; one of a tick handed out already is dropped.
+        """Keep the first state of a tick until the tick is complete.
+
+        One of a tick handed out already is dropped.
 
         Raises
         ------
@@ -37,9 +45,9 @@ class TickJoin:
         if state.tick >= self._next + AHEAD:
             raise TooFarAhead(state.tick, self._next)
         if isinstance(state, TissueState):
-            self._tissues[state.tick] = state
+            self._tissues.setdefault(state.tick, state)
         else:
-            self._robots[state.tick] = state
+            self._robots.setdefault(state.tick, state)
 
     @property
     def is_empty(self) -> bool:

@@ -6,8 +6,9 @@ from collections.abc import Callable
 from fras_common import messages as m
 from fras_common.codec import content_digest
 from fras_common.errors import FrasError
-from fras_common.scenario import Scenario
+from fras_common.scenario import Scenario, check
 from fras_common.service import Deferred, ServiceHost
+from fras_common.service.recall import Recall
 from fras_common.topics import (
     CONTEXT,
     ROBOT_STATE,
@@ -20,6 +21,7 @@ from fras_common.topics import (
 )
 from fras_sa.awareness import AwarenessError
 from fras_sa.errors import NothingKnown, OtherTrial, TooManyQuestions
+from fras_sa.resumption import TakenUp, take_up
 from fras_sa.trial import WatchedTrial
 from fras_sa.waiting import Waiting
 
@@ -41,6 +43,7 @@ class AwarenessService:
         self._host = host
         self._clock = clock
         self._trial = WatchedTrial(Scenario())
+        self._request: m.ResetRequest | None = None
         self._pending: list[Deferred[m.ContextRequest, m.Context]] = []
         self._waiting = Waiting()
         self._verdict = host.publisher(VERDICT)
@@ -49,14 +52,33 @@ class AwarenessService:
         host.subscribe(TISSUE_STATE, self._on_tissue)
         host.subscribe(ROBOT_STATE, self._on_robot)
         host.serve(SA_RESET, self._reset)
-        host.serve(SA_TARGET, self._target)
+        host.serve_deferred(SA_TARGET, self._on_target_request)
         host.serve_deferred(SA_CONTEXT, self._on_context_request)
+        self._recall = Recall(host, take_up(), self._take_up)
 
     def _reset(self, request: m.ResetRequest) -> m.ResetReply:
-        self._fail_pending(NothingKnown("another trial began"))
-        self._trial = WatchedTrial(request.scenario)
-        self._host.enter_trial(request.trial)
+        check(request.scenario)
+        self._recall.give_up()
+        # Asked again because an answer was lost: nothing has happened since that would be undone.
+        if self._trial.tick > 0 or request != self._request:
+            self._fail_pending(NothingKnown("another trial began"))
+            self._trial = WatchedTrial(request.scenario)
+            self._request = request
+            self._host.enter_trial(request.trial)
         return m.ResetReply(digest=content_digest(request.trial, request.scenario, request.mesh))
+
+    def _take_up(self, taken: TakenUp | None) -> None:
+        if taken is None:
+            return
+        self._trial, self._request = taken.trial, taken.asked.request
+        # This process speaks for what the one before it was told.
+        self._host.publish_mirror(SA_RESET, taken.asked.record)
+        for verdict in taken.verdicts:
+            self._verdict.put(verdict)
+        name = taken.asked.request.trial
+        self._host.log.warning("trial taken up", trial=name, tick=taken.trial.tick)
+        self._host.enter_trial(name)
+        self._host.tick = taken.trial.tick
 
     def _fail_pending(self, error: FrasError) -> None:
         waiting, self._pending = self._pending, []
@@ -101,6 +123,8 @@ class AwarenessService:
     def _on_context_request(self, pending: Deferred[m.ContextRequest, m.Context]) -> None:
         """Answer, or keep the question until its tick has been judged."""
         request, trial = pending.request, self._trial
+        if self._is_early(request.trial, lambda: self._on_context_request(pending)):
+            return
         try:
             self._require_trial(request.trial)
             if trial.problem is None and (trial.verdict is None or trial.tick < request.min_tick):
@@ -114,20 +138,33 @@ class AwarenessService:
             return
         pending.reply(self._context.put(context))
 
-    def _target(self, request: m.TargetRequest) -> m.TargetReply:
-        self._require_trial(request.trial)
-        return self._trial.target(request)
+    def _on_target_request(self, pending: Deferred[m.TargetRequest, m.TargetReply]) -> None:
+        request = pending.request
+        if self._is_early(request.trial, lambda: self._on_target_request(pending)):
+            return
+        try:
+            self._require_trial(request.trial)
+            reply = self._trial.target(request)
+        except FrasError as error:
+            pending.fail(error)
+        else:
+            pending.reply(reply)
+
+    def _is_early(self, asked: str, again: Callable[[], None]) -> bool:
+        """Whether a question comes before it is known which trial is under way: it is kept."""
+        return asked != self._host.gate.trial and self._recall.keep(again)
 
     def _require_trial(self, asked: str) -> None:
         if asked != self._host.gate.trial:
             raise OtherTrial(asked, self._host.gate.trial)
 
     def wake(self) -> float | None:
-        """Say in health who has been waited for; nothing else is due by time."""
+        """Say in health who has been waited for; ask what is to be taken up."""
         # A question about a tick of which nothing is here waits for motion to begin it.
         missing = self._trial.missing or ("motion" if self._pending else "")
         self._host.waiting_for = self._waiting.told(missing, self._clock())
-        return Waiting.period_s if missing else None
+        waits_s = (self._recall.wake(self._clock()), Waiting.period_s if missing else None)
+        return min((wait_s for wait_s in waits_s if wait_s is not None), default=None)
 
     def close(self) -> None:
         """Nothing to put in order."""

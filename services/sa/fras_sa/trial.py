@@ -1,5 +1,7 @@
 """One trial as situation awareness sees it: messages in, messages out, no bus."""
 
+from collections.abc import Sequence
+
 from fras_common import messages as m
 from fras_common.scenario import Scenario
 from fras_sa.adapter import (
@@ -11,8 +13,8 @@ from fras_sa.adapter import (
     tissue_of,
     verdict_of,
 )
-from fras_sa.awareness import Awareness, AwarenessError, Memory
-from fras_sa.errors import NothingKnown
+from fras_sa.awareness import Awareness, AwarenessError, Memory, Trend
+from fras_sa.errors import LostMoment, NothingKnown
 from fras_sa.join import Moment, TickJoin
 
 
@@ -56,13 +58,15 @@ class WatchedTrial:
         return self._join.missing
 
     def see_model(self, model: m.TissueModel) -> None:
-        """Take the scene.
+        """Take the scene; once is enough, a simulator that starts again says it again.
 
         Raises
         ------
         AwarenessError
             If it can't be watched; kept as `problem`.
         """
+        if self._awareness is not None:
+            return
         try:
             self._awareness = Awareness(self._parameters, model_of(model))
         except AwarenessError as error:
@@ -89,6 +93,51 @@ class WatchedTrial:
         self._now = moment
         self.verdict = verdict_of(judgement, self._parameters, moment.tissue)
         return self.verdict
+
+    def resume(
+        self,
+        verdict: m.Verdict | None,
+        tissues: Sequence[m.TissueState],
+        robots: Sequence[m.RobotState],
+    ) -> list[m.Verdict]:
+        """Come to where the one before was; the scene has been taken.
+
+        Parameters
+        ----------
+        verdict : Verdict or None
+            The last one; None before the first.
+        tissues, robots : sequence of TissueState, RobotState
+            From its tick on, or from 0 on.
+
+        Returns
+        -------
+        list of Verdict
+            To say: the last one again, and those that were still to come.
+
+        Raises
+        ------
+        LostMoment
+            The states that the last verdict is about are not among these.
+        """
+        said: list[m.Verdict] = []
+        if verdict is not None:
+            tissue = next((one for one in tissues if one.tick == verdict.tick), None)
+            robot = next((one for one in robots if one.tick == verdict.tick), None)
+            if tissue is None or robot is None:
+                raise LostMoment(verdict.tick)
+            trend = Trend.restored(
+                verdict.tick, verdict.level, verdict.max_force_n, verdict.force_rate_n_s
+            )
+            self._memory = Memory.restored(verdict.max_height, robot_of(robot).action, trend)
+            self._now = Moment(tissue, robot)
+            self._join = TickJoin(verdict.tick + 1)
+            self.verdict = verdict
+            said.append(verdict)
+        for state in (*tissues, *robots):
+            self._join.add(state)
+        while (one := self.judge_next()) is not None:
+            said.append(one)
+        return said
 
     def context(self, request: m.ContextRequest) -> m.Context:
         """Tell the situation at the last tick judged.

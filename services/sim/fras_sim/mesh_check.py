@@ -10,9 +10,9 @@ from typing import NoReturn
 import msgspec
 
 from fras_common.errors import FrasError
+from fras_common.extras import require_extra
 from fras_common.messages import Fault
 from fras_common.scenario import MeshFacts
-from fras_common.service.extras import require_extra
 
 EXIT_REFUSED = 2
 

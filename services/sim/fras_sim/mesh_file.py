@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fras_common.errors import FrasError
+from fras_common.extras import MissingExtra
 from fras_common.scenario import MeshFacts
-from fras_common.service.extras import MissingExtra
 from fras_sim.fem.cells import Cell
 from fras_sim.fem.element import CELL_OF
 from fras_sim.fem.mesh import Mesh, make_mesh

@@ -84,6 +84,30 @@ class Driver(Protocol):
         """
         ...
 
+    def resume(self, setpoint: Setpoint, measured: Measured, tick: int) -> Measured:
+        """Take an arm over from a process that is no more; it stays where it is.
+
+        Parameters
+        ----------
+        setpoint : Setpoint
+            What was last sent to it.
+        measured : Measured
+            What it did then.
+        tick : int
+            Of the trial.
+
+        Returns
+        -------
+        Measured
+            What it does now.
+
+        Raises
+        ------
+        DriverFault
+            It does not answer, or stands elsewhere.
+        """
+        ...
+
     def send(self, setpoint: Setpoint) -> None:
         """Have the arm follow a setpoint from now on; never waits.
 

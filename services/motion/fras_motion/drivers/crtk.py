@@ -89,6 +89,32 @@ class CrtkDriver:
         )
         return measured
 
+    def resume(self, setpoint: Setpoint, measured: Measured, tick: int) -> Measured:
+        """Take over an arm that has stood at its last setpoint meanwhile.
+
+        Parameters
+        ----------
+        setpoint, measured, tick
+            See `Driver.resume`.
+
+        Returns
+        -------
+        Measured
+            The arm now.
+
+        Raises
+        ------
+        DriverFault
+            It stands elsewhere, or does not say where.
+        """
+        del measured, tick
+        self._sent = setpoint
+        self._link.listen(self._arm)
+        now = self._await()
+        text = "does not stand where it was last sent; somebody else has led it meanwhile"
+        self._require_near(now, setpoint, (*_LAGS, _LAG_JAW_RAD), text)
+        return now
+
     def send(self, setpoint: Setpoint) -> None:
         """Send a setpoint.
 

@@ -77,6 +77,27 @@ class SimulatedDriver:
         self._last = self._measure()
         return _measured(self._last, (0.0,) * 6)
 
+    def resume(self, setpoint: Setpoint, measured: Measured, tick: int) -> Measured:
+        """Go on from where the arm was seen last; setpoints under way have arrived.
+
+        Parameters
+        ----------
+        setpoint, measured
+            See `Driver.resume`.
+        tick : int
+            Seeds the noise anew, together with its own seed.
+
+        Returns
+        -------
+        Measured
+            As given.
+        """
+        self._generator = np.random.default_rng((self._seed, tick))
+        self._state = self._last = (*measured.joints, measured.jaw_rad)
+        self._goal = (*setpoint.joints, setpoint.jaw_rad)
+        self._sent = deque([self._goal])
+        return measured
+
     def send(self, setpoint: Setpoint) -> None:
         """Follow a setpoint from now on, see `Driver.send`.
 

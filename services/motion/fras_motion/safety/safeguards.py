@@ -51,6 +51,10 @@ _ROWS = (
         "goal",
         "A goal or verdict of another trial, or of a cancelled one, moves nothing.",
     ),
+    Safeguard(
+        "restart", "goal", "A motion that starts again moves nothing before its executive knows."
+    ),
+    Safeguard("goal_used", "goal", "A goal that was taken once in its trial moves nothing again."),
     Safeguard("busy", "goal", "One action at a time.", check=admission.busy),
     Safeguard(
         "unknown_action", "goal", "Only the five actions are done.", check=admission.unknown_action
@@ -110,6 +114,11 @@ _ROWS = (
         "force_hard", "verdict", "Any action that crosses the hard limit stops and gives way."
     ),
     Safeguard("hold", "arms", "A stop from anyone brings the arms to rest within two ticks."),
+    Safeguard(
+        "supervision",
+        "arms",
+        "Nothing moves while nobody who could stop it looks at the surgeon's page.",
+    ),
     Safeguard("cancel", "arms", "A cancelled trial ends with the arms at rest."),
     Safeguard(
         "watchdog", "time", "No verdict, no tick; a peer silent for too long ends the trial."

@@ -34,6 +34,8 @@ class Context:
         Plan as if there were no attachments.
     tried : tuple of str
         Blocks that are no candidates any more.
+    rejected : tuple of str
+        Blocks, and arms, that a person has excluded from grasping.
     reason : str
         Why a plan is made now; only told.
     evidence : mapping of str to mapping of str to float
@@ -47,6 +49,7 @@ class Context:
     fixed_points_m: tuple[Point, ...] = ()
     ignore_ap: bool = False
     tried: tuple[str, ...] = ()
+    rejected: tuple[str, ...] = ()
     reason: str = "initial"
     evidence: Mapping[str, Mapping[str, float]] = field(default_factory=dict[str, dict[str, float]])
 

@@ -60,3 +60,28 @@ class Search:
                 raise OutOfTime
             result = handle.get()
             return result, handle.core() if result.unsatisfiable else []
+
+
+class Best:
+    """The best model so far; one that was not taken yet is empty."""
+
+    def __init__(self) -> None:
+        self.atoms: list[clingo.Symbol] = []
+        self.candidates = 0
+        self.cost: tuple[int, ...] = ()
+        self.levels: tuple[int, ...] = ()
+        self.models = 0
+
+    def take(self, model: clingo.Model) -> None:
+        """Keep a model, better than the one before."""
+        shown = model.symbols(shown=True)
+        # There may be thousands of candidates; only their number is told.
+        self.atoms = [atom for atom in shown if atom.name != "candidate"]
+        self.candidates = len(shown) - len(self.atoms)
+        self.cost = tuple(model.cost)
+        self.levels = tuple(model.priority)
+        self.models += 1
+
+    def named(self, name: str) -> list[list[clingo.Symbol]]:
+        """Arguments of the atoms of that name."""
+        return sorted(atom.arguments for atom in self.atoms if atom.name == name)

@@ -21,6 +21,12 @@ def functor(atom: str) -> str:
     return atom.partition("(")[0]
 
 
+def exclusion(name: str, arms: Collection[str]) -> str:
+    """Atom that says of a block, or of one of the arms, that a person has excluded it."""
+    name = normalised(name)
+    return f"barred({name})" if name in arms else f"rejected({name})"
+
+
 @dataclass(frozen=True)
 class Alphabet:
     """Arms and fluents.
@@ -124,6 +130,9 @@ class Alphabet:
 
 def _parsed(text: str, sorts: Mapping[str, tuple[str, ...]]) -> clingo.Symbol | None:
     """Return a term of one of the forms, or nothing."""
+    if not text.isascii():
+        # clingo's own words on it may cut a letter in two, and then can't be decoded.
+        return None
     try:
         symbol = clingo.parse_term(text, logger=_ignore)
     except RuntimeError:

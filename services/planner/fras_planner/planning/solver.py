@@ -26,8 +26,8 @@ from fras_planner.planning.plan import NoPlan, Plan, WhyNot
 from fras_planner.planning.program import PLAN_FILES, Knowledge, Program
 from fras_planner.planning.scene import PlanningScene
 from fras_planner.planning.scene_facts import SceneFacts
-from fras_planner.planning.search import OutOfTime, Search
-from fras_planner.planning.signature import STATIC, normalised
+from fras_planner.planning.search import Best, OutOfTime, Search
+from fras_planner.planning.signature import STATIC, exclusion, normalised
 
 GOALS = ("visible", "clear")
 # Both arms let go, then reach, grasp and pull: no plan of these rules needs more.
@@ -40,30 +40,6 @@ TIME_LIMIT_S = 5.0
 NEEDS_TARGET = ("reach", "grasp")
 
 Sensed = dict[str, clingo.Symbol]
-
-
-class _Best:
-    """The best model so far."""
-
-    def __init__(self) -> None:
-        self.atoms: list[clingo.Symbol] = []
-        self.candidates = 0
-        self.cost: tuple[int, ...] = ()
-        self.levels: tuple[int, ...] = ()
-        self.models = 0
-
-    def take(self, model: clingo.Model) -> None:
-        shown = model.symbols(shown=True)
-        # There may be thousands of candidates; only their number is told.
-        self.atoms = [atom for atom in shown if atom.name != "candidate"]
-        self.candidates = len(shown) - len(self.atoms)
-        self.cost = tuple(model.cost)
-        self.levels = tuple(model.priority)
-        self.models += 1
-
-    def named(self, name: str) -> list[list[clingo.Symbol]]:
-        """Arguments of the atoms of that name."""
-        return sorted(atom.arguments for atom in self.atoms if atom.name == name)
 
 
 def _no_clock() -> float:
@@ -155,6 +131,7 @@ class Planner:
         fluents: Iterable[str],
         ignore_ap: bool = False,
         tried: Iterable[str] = (),
+        rejected: Iterable[str] = (),
         *,
         reason: str = "initial",
         evidence: Evidence | None = None,
@@ -170,6 +147,8 @@ class Planner:
             Plan as if there were no attachments.
         tried : iterable of str
             Blocks that are no candidates any more.
+        rejected : iterable of str
+            Blocks, and arms, that a person has excluded from grasping.
         reason : str
             Why a plan is made now, ``kind`` or ``kind: detail``; only told.
         evidence : mapping of str to mapping of str to float, optional
@@ -190,15 +169,15 @@ class Planner:
         SceneChanged
             If there are static atoms and they are not those of the scene.
         """
-        sensed = self._read(fluents, ignore_ap, tried)
+        sensed = self._read(fluents, ignore_ap, tried, rejected)
         self._assign(sensed)
-        best = _Best()
+        best = Best()
         began = self._clock()
         self._search.begin()
         try:
             result, _ = self._search(self._assumptions, best.take)
         except OutOfTime:
-            best, result = _Best(), None
+            best, result = Best(), None
         solve_s = self._clock() - began
         ground_s, self._ground_s = self._ground_s, 0.0
         if not best.models:
@@ -239,6 +218,7 @@ class Planner:
         fluents: Iterable[str],
         ignore_ap: bool = False,
         tried: Iterable[str] = (),
+        rejected: Iterable[str] = (),
     ) -> WhyNot:
         """Say why the plan for a context does not grasp a block, or does not begin with an action.
 
@@ -246,7 +226,7 @@ class Planner:
         ----------
         question : str
             A block `b(i,j)`, or an action as `domain.lp` declares it, `pull(psm1,b(3,2))`.
-        fluents, ignore_ap, tried
+        fluents, ignore_ap, tried, rejected
             As for `plan`.
 
         Returns
@@ -266,7 +246,7 @@ class Planner:
         if is_block and asked not in self._facts.blocks:
             raise UnknownBlock(asked, asked, self._facts.blocks)
         action = None if is_block else self._knowledge.alphabet.action(asked, self._facts.blocks)
-        plan = self.plan(fluents, ignore_ap, tried)
+        plan = self.plan(fluents, ignore_ap, tried, rejected)
         block = asked if action is None else str(action.arguments[-1])
         facts = [
             f"asked({asked})",
@@ -305,7 +285,7 @@ class Planner:
         given = [atom.literal for atom in atoms if atom is not None]
         if len(given) < len(wanted):
             return [], []
-        best = _Best()
+        best = Best()
         try:
             result, _ = self._search([*given, *self._assumptions], best.take)
             if not best.models and not result.unsatisfiable:
@@ -332,7 +312,13 @@ class Planner:
         finally:
             solving.opt_mode = "opt"
 
-    def _read(self, fluents: Iterable[str], ignore_ap: bool, tried: Iterable[str]) -> Sensed:
+    def _read(
+        self,
+        fluents: Iterable[str],
+        ignore_ap: bool,
+        tried: Iterable[str],
+        rejected: Iterable[str],
+    ) -> Sensed:
         """Check the atoms; those that may change, in alphabetical order."""
         alphabet = self._knowledge.alphabet
         atoms = {normalised(atom) for atom in fluents}
@@ -342,6 +328,7 @@ class Planner:
             raise SceneChanged(sorted(statics ^ self.scene.statics))
         atoms -= statics
         atoms |= {f"tried({normalised(block)})" for block in tried}
+        atoms |= {exclusion(name, alphabet.arms) for name in rejected}
         if ignore_ap:
             atoms.add("ignore_ap")
         return {atom: alphabet.symbol(atom, self._facts.blocks) for atom in sorted(atoms)}
@@ -356,12 +343,12 @@ class Planner:
         self._sensed_now = sensed
 
     @staticmethod
-    def _check_contradictions(best: _Best, sensed: Sensed) -> None:
+    def _check_contradictions(best: Best, sensed: Sensed) -> None:
         for arm, rule in best.named("contradiction"):
             about = [atom for atom, symbol in sensed.items() if arm in symbol.arguments]
             raise ContradictoryFluents(str(rule), about, sensed)
 
-    def _facts_about(self, best: _Best, sensed: Sensed, steps: int) -> list[str]:
+    def _facts_about(self, best: Best, sensed: Sensed, steps: int) -> list[str]:
         """Facts for telling a plan; only the blocks that it involves are described."""
         involved = [str(symbol.arguments[-1]) for symbol in sensed.values() if symbol.arguments]
         involved += [str(block) for _, block in best.named("target")]
@@ -371,7 +358,7 @@ class Planner:
             about += self._facts.reachable(str(block))
         return [*shown, *sensed, *about, *self._facts.above_roi, *self._counts(best, steps - 1)]
 
-    def _counts(self, best: _Best, actions: int) -> list[str]:
+    def _counts(self, best: Best, actions: int) -> list[str]:
         return [
             f"criterion({self.criterion})",
             f"count(candidates,{best.candidates})",
@@ -382,7 +369,7 @@ class Planner:
     def _why_none(self, sensed: Sensed, why_now: list[str], unproved: str) -> NoPlan:
         """Say why there is no plan; `unproved`: what ended the search before that was proved."""
         core = [unproved]
-        best = _Best()
+        best = Best()
         try:
             with self._any_model():
                 # Without any rule there is always a model; it tells contradictions and candidates.

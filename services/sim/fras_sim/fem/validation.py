@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import KDTree
 
 from fras_sim.fem.cells import TOPOLOGY, Cell
 from fras_sim.fem.errors import BadMesh
@@ -211,6 +210,9 @@ def _check_size(nodes_m: NDArray[np.float64], scale: float) -> None:
 def _check_duplicates(nodes_m: NDArray[np.float64]) -> None:
     if len(nodes_m) < 2:
         return
+    # Not at the top: a box needs no search, and each start of the simulator would load it.
+    from scipy.spatial import KDTree
+
     nearest_m = KDTree(nodes_m).query(nodes_m, k=2)[0][:, 1]
     diagonal_m = float(np.linalg.norm(np.ptp(nodes_m, axis=0)))
     twins = np.flatnonzero(nearest_m <= SAME_PLACE * diagonal_m)
