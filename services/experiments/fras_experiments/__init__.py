@@ -1,0 +1,1 @@
+"""Experiments: campaigns over the real stack, repeated, counted and drawn."""

@@ -1,0 +1,1 @@
+"""FRAS: the surgeon's page."""

@@ -1,0 +1,125 @@
+"""Everything that the page hears of its cell, on the bus's threads, and into one mailbox."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+from fras_common import messages as m
+from fras_common.codec import MalformedMessage, decode
+from fras_common.errors import FrasError
+from fras_common.service import ServiceHost
+from fras_common.topics import (
+    ACTION_RESULT,
+    CONTEXT,
+    HEALTH,
+    HOLDS,
+    PLAN,
+    RECORDER_LAST,
+    RECORDER_STATUS,
+    ROBOT_STATE,
+    SUPERVISOR_STATUS,
+    TASK_STATUS,
+    TISSUE_MODEL,
+    TISSUE_STATE,
+    VERDICT,
+    Topic,
+)
+from fras_monitor.mail import Mail
+from fras_monitor.picture import Picture, apply, remembered, with_token
+
+ANSWER_S: Final = 2.0
+
+# Of these only the latest counts; of the others each does.
+LATEST: Final[tuple[Topic[Any], ...]] = (TISSUE_MODEL, TISSUE_STATE, CONTEXT, RECORDER_STATUS)
+EACH: Final[tuple[Topic[Any], ...]] = (
+    VERDICT, PLAN, TASK_STATUS, ACTION_RESULT, HOLDS, SUPERVISOR_STATUS,
+)  # fmt: skip
+# Not latched: who opens the page between two actions would see nothing of them.
+MISSED: Final[tuple[Topic[Any], ...]] = (TISSUE_STATE, ROBOT_STATE, VERDICT, CONTEXT)
+
+
+@dataclass(frozen=True)
+class _Token:
+    name: str
+    present: bool
+
+
+@dataclass(frozen=True)
+class _Remembered:
+    message: m.Header
+
+
+class Listener:
+    """Subscribes to what the page shows; `look` gives the picture of it.
+
+    Parameters
+    ----------
+    host : ServiceHost
+    on_robot : callable
+        Told each state of the arms on the bus's own thread, as soon as it arrives.
+    """
+
+    def __init__(self, host: ServiceHost, on_robot: Callable[[m.RobotState], None]) -> None:
+        self._host = host
+        self._on_robot = on_robot
+        self._mail = Mail()
+        self.picture = Picture()
+        bus = host.bus
+        topic: Topic[Any]
+        for topic in LATEST:
+            bus.subscribe(topic, self._keep_latest(topic.key))
+        for topic in EACH:
+            bus.subscribe(topic, self.note)
+        bus.subscribe(HEALTH, self._on_health)
+        bus.subscribe(ROBOT_STATE, self._on_robot_state)
+        bus.watch_tokens(lambda name, present: self.note(_Token(name, present)))
+        for topic in MISSED:
+            request = m.LastRequest(key=topic.key)
+            bus.ask(RECORDER_LAST, request, self._take_last(topic), ANSWER_S)
+
+    def note(self, message: object) -> None:
+        """Take in a message, or an answer to a question of the page; on any thread."""
+        self._mail.append(message, time.monotonic())
+
+    def look(self) -> Picture:
+        """Take in what has arrived, and return all that is known."""
+        for message, at_s in self._mail.take():
+            self.picture = _with(self.picture, message, at_s)
+        self._host.counts["received"] = self._mail.received
+        self._host.counts["queue_dropped"] = self._mail.dropped
+        return self.picture
+
+    def _keep_latest(self, key: str) -> Callable[[m.Header], None]:
+        return lambda message: self._mail.replace(key, message, time.monotonic())
+
+    def _on_health(self, health: m.Health) -> None:
+        self._mail.replace(("health", health.service), health, time.monotonic())
+
+    def _on_robot_state(self, robot: m.RobotState) -> None:
+        self._on_robot(robot)
+        self._mail.replace(ROBOT_STATE.key, robot, time.monotonic())
+
+    def _take_last(self, topic: Topic[Any]) -> Callable[[m.LastReply | FrasError], None]:
+        def on_done(answer: m.LastReply | FrasError) -> None:
+            # No recorder, or it has heard nothing: then there is nothing to see yet.
+            if isinstance(answer, FrasError) or not answer.payload:
+                return
+            try:
+                message = decode(topic.type, answer.payload, topic.key, topic.max_bytes)
+            except MalformedMessage as error:
+                self._host.count_malformed(error)
+                return
+            self.note(_Remembered(message))
+
+        return on_done
+
+
+def _with(picture: Picture, message: object, at_s: float) -> Picture:
+    match message:
+        case _Token(name, present):
+            return with_token(picture, name, present)
+        case _Remembered(what):
+            return remembered(picture, what)
+        case _:
+            return apply(picture, message, at_s)

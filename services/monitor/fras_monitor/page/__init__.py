@@ -1,0 +1,1 @@
+"""The page itself: who may enter, what is drawn, what its buttons do."""

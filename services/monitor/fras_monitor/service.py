@@ -1,0 +1,160 @@
+"""The page's shell: draws 20 times a second what it hears, passes on what buttons ask."""
+
+import os
+import time
+from collections.abc import Callable
+from typing import Final
+
+import msgspec
+import rich
+
+from fras_common import messages as m
+from fras_common.errors import FrasError
+from fras_common.service import ServiceHost
+from fras_common.topics import PRESENCE, REPLAY_STATUS
+from fras_monitor.access import Policy, query_of, require_closed
+from fras_monitor.commands import AnyCommand, Colouring, Look, Stop
+from fras_monitor.desk import Desk
+from fras_monitor.listening import Listener
+from fras_monitor.pace import Due
+from fras_monitor.page.door import Door
+from fras_monitor.page.hub import Hub
+from fras_monitor.page.scene import Scene
+from fras_monitor.picture import Picture
+from fras_monitor.stop import Stopper
+from fras_monitor.view import course_of, holds_of, view_of
+
+FRAME_S: Final = 0.05
+COURSE_S: Final = 0.25
+PRESENCE_S: Final = 0.25
+REPLAY_S: Final = 0.1
+BEATS_A_SECOND: Final = 4
+ANSWER_S: Final = 2.0
+
+
+class MonitorService:
+    """Serves the surgeon's page.
+
+    Parameters
+    ----------
+    host : ServiceHost
+    bind, port : str, int
+        Where the page listens.
+    policy : Policy
+    announce : callable
+        Told the page's address once it can be opened.
+
+    Raises
+    ------
+    OpenToAll, PortInUse
+    """
+
+    def __init__(
+        self,
+        host: ServiceHost,
+        bind: str,
+        port: int,
+        policy: Policy,
+        announce: Callable[[str], None],
+    ) -> None:
+        require_closed(bind, policy)
+        self._host = host
+        self._frame, self._course = Due(FRAME_S), Due(COURSE_S)
+        self._presence_due, self._replay = Due(PRESENCE_S), Due(REPLAY_S)
+        self._looking = (0, 0)
+        # No supervisor keeps the page, and so none says which process it is.
+        host.facts["pid"] = str(os.getpid())
+        self._presence = host.publisher(PRESENCE)
+        self.stopper = Stopper(host.bus)
+        self._hub = Hub(f"{time.time_ns():x}", self._on_command)
+        door = Door(bind, port, policy, self._hub.attend)
+        self._server = door.open()
+        self._scene = Scene(self._server, self._on_block)
+        self._listener = Listener(host, self.stopper.see)
+        self._desk = Desk(
+            host.bus,
+            self.stopper,
+            self._hub.say,
+            lambda: self._listener.picture.trial,
+            lambda: holds_of(self._listener.picture),
+            self._listener.note,
+            self._colour,
+        )
+        self.address = door.address
+        announce(self.address)
+
+    def _on_command(self, command: AnyCommand) -> None:
+        """Do what a button asks; the stop at once, on the thread that got it."""
+        if isinstance(command, Stop):
+            self.stopper.press()
+        elif isinstance(command, Look):
+            self._scene.look(command.page, command.place)
+        else:
+            self._host.post(lambda: self._desk.do(command))
+
+    def _on_block(self, block: str) -> None:
+        self._host.post(lambda: self._desk.why_not(block))
+
+    def _colour(self, by: Colouring) -> None:
+        self._scene.colouring = by
+
+    def wake(self) -> float | None:
+        """Draw what is due; return the seconds until the next time."""
+        now_s = time.monotonic()
+        if not self._frame.take(now_s):
+            return self._frame.wait_s(now_s)
+        picture = self._listener.look()
+        self._host.tick = picture.robot.message.tick if picture.robot is not None else -1
+        if picture.holds is not None:
+            self.stopper.see_holds(picture.holds.message.holds, picture.holds.at_s)
+        self._say_who_looks(now_s)
+        self._show(picture, now_s)
+        self._scene.draw(picture)
+        return self._frame.wait_s(time.monotonic())
+
+    def _show(self, picture: Picture, now_s: float) -> None:
+        view = msgspec.to_builtins(view_of(picture, self.stopper.record, now_s))
+        beat = int(now_s * BEATS_A_SECOND)
+        self._hub.publish({**view, "colouring": self._scene.colouring, "beat": beat})
+        if self._course.take(now_s):
+            self._hub.publish({"course": msgspec.to_builtins(course_of(picture))})
+        if picture.is_replay and self._replay.take(now_s):
+            request = m.ReplayStatusRequest(marks=picture.replay is None)
+            self._host.bus.ask(REPLAY_STATUS, request, self._on_replay, ANSWER_S)
+
+    def _say_who_looks(self, now_s: float) -> None:
+        looking = self._hub.counts(now_s)
+        if self._presence_due.take(now_s) or looking != self._looking:
+            self._looking = looking
+            surgeons, viewers = looking
+            self._presence.put(m.Presence(viewers=surgeons, read_only=viewers))
+            self._host.facts |= {"pages": str(surgeons + viewers), "address": self.address}
+
+    def _on_replay(self, answer: m.ReplayStatus | FrasError) -> None:
+        # One that has just ended answers no more; its token goes, too, and with it the time line.
+        if isinstance(answer, m.ReplayStatus):
+            self._listener.note(answer)
+
+    def close(self) -> None:
+        """End the page; who has it open sees that."""
+        self._server.stop()
+        self.stopper.close()
+
+
+def build(
+    host: ServiceHost, *, host_name: str, port: int, token: str, view_token: str, read_only: bool
+) -> MonitorService:
+    """Make the shell of what the command line says.
+
+    Raises
+    ------
+    OpenToAll, PortInUse, BadToken
+    """
+    policy = Policy(token, view_token, read_only)
+    # viser prints where it listens, its address without a token, and when it ends.
+    rich.reconfigure(quiet=True)
+
+    def announce(address: str) -> None:
+        print(f"the surgeon's page: {address}{query_of(policy)}", flush=True)
+
+    return MonitorService(host, host_name, port, policy, announce)
