@@ -6,7 +6,7 @@ import sys
 import threading
 import time
 from collections.abc import Generator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +31,7 @@ WAIT_S = 20.0
 TICKS_S = 50
 """Of a trial at pace 1."""
 PER_TICK = 3
+PRODUCERS = ("motion", "sa", "sim", "planner")
 
 
 @contextmanager
@@ -54,13 +55,13 @@ def processes(connect: str) -> Generator[subprocess.Popen[bytes]]:
 def measure(folder: Path, speeds: list[float], seconds: float) -> list[dict[str, Any]]:
     """Send a trial's three keys at each multiple of its rate, and look into the log."""
     connect = f"tcp/127.0.0.1:{free_port()}"
-    with processes(connect) as recorder:
-        bus = ZenohBus("bench", connect, "bench/1", open_timeout_s=WAIT_S)
-        try:
-            _await_recorder(bus)
-            return [_one(bus, folder, recorder.pid, speed, seconds) for speed in speeds]
-        finally:
-            bus.close()
+    with processes(connect) as recorder, ExitStack() as opened:
+        buses: dict[str, ZenohBus] = {}
+        for name in ("cli", *PRODUCERS):
+            buses[name] = ZenohBus("bench", connect, f"{name}/1", open_timeout_s=WAIT_S)
+            opened.callback(buses[name].close)
+        _await_recorder(buses["cli"])
+        return [_one(buses, folder, recorder.pid, speed, seconds) for speed in speeds]
 
 
 def _await_recorder(bus: ZenohBus) -> None:
@@ -70,13 +71,17 @@ def _await_recorder(bus: ZenohBus) -> None:
         raise RuntimeError("the recorder did not start")
 
 
-def _one(bus: ZenohBus, folder: Path, pid: int, speed: float, seconds: float) -> dict[str, Any]:
+def _one(
+    buses: dict[str, ZenohBus], folder: Path, pid: int, speed: float, seconds: float
+) -> dict[str, Any]:
+    bus = buses["cli"]
     directory = folder / f"{speed:g}"
     scenario = Scenario(seed=1)
     request = OpenRequest(trial=TRIAL, scenario=scenario, mesh=b"", directory=str(directory))
     bus.query(RECORDER_OPEN, request, WAIT_S)
-    robots, verdicts = bus.publisher(ROBOT_STATE), bus.publisher(VERDICT)
-    tissues = bus.publisher(TISSUE_STATE)
+    robots = buses["motion"].publisher(ROBOT_STATE)
+    verdicts = buses["sa"].publisher(VERDICT)
+    tissues = buses["sim"].publisher(TISSUE_STATE)
     shapes = [tissue(tick) for tick in range(SHAPES)]
     ticks = round(TICKS_S * speed * seconds)
     pause = threading.Event()
@@ -89,7 +94,7 @@ def _one(bus: ZenohBus, folder: Path, pid: int, speed: float, seconds: float) ->
         tissues.put(msgspec.structs.replace(shapes[tick % SHAPES], tick=tick))
         verdicts.put(verdict(tick))
     spent_s = time.perf_counter() - began_s
-    status = bus.publisher(TASK_STATUS).put(_ended())
+    status = buses["planner"].publisher(TASK_STATUS).put(_ended())
     close = CloseRequest(trial=TRIAL, last_tick=ticks - 1, status_seq=status.seq)
     reply = bus.query(RECORDER_CLOSE, close, WAIT_S)
     used_s = _cpu_s(pid) - cpu_s

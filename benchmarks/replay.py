@@ -32,7 +32,7 @@ from fras_cli.stack import own_stack
 from fras_cli.trial import TrialFollower
 from fras_common.bus.zenoh_bus import ZenohBus
 from fras_common.service import run_shell
-from fras_common.service.signals import StopFlag
+from fras_common.signals import StopFlag
 from fras_replay import (
     UNLIMITED,
     Player,

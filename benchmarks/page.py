@@ -1,0 +1,93 @@
+"""The surgeon's page: `fras bench page [--stops N] [--pairs N] [--opens N] [--json FILE]`.
+
+How long after the server's receipt of a click the arms are at rest, at pace 1; what an open page
+costs a tick, as trials in turn with and without a client that takes everything and draws nothing;
+how soon after a page is opened tissue is drawn, by a headless browser without a graphics processor.
+"""
+
+import argparse
+import json
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from benchmarks.browser import Fence, chromium
+from benchmarks.machine import processor
+from benchmarks.page_jobs import Floats, measure_first_picture, measure_stops, tick_ms, watched
+from benchmarks.surgeon import SurgeonsPage, served
+from benchmarks.theatre import Theatre
+
+from fras_cli.stack import own_stack
+from fras_common.threads import one_thread
+
+
+def spread(values: Floats, digits: int = 1) -> dict[str, float]:
+    p50, p99 = np.percentile(values, [50, 99])
+    worst = float(values.max())
+    return {
+        name: round(float(value), digits)
+        for name, value in (("p50", p50), ("p99", p99), ("most", worst))
+    }
+
+
+def measure_page(
+    folder: Path, stops: int, pairs: int, opens: int, *, scene: bool
+) -> dict[str, Any]:
+    figures: dict[str, Any] = {"processor": processor(), "stops": stops, "pairs": pairs}
+    fence = Fence()
+    with own_stack("bench-page", None, folder / "logs") as stack:
+        theatre = Theatre(stack, folder)
+        alone: list[Floats] = []
+        seen: list[Floats] = []
+        for seed in range(1, pairs + 1):
+            alone.append(tick_ms(theatre, seed))
+            with served(stack.link) as page, watched(page.address):
+                seen.append(tick_ms(theatre, seed))
+            print(f"pair {seed} of {pairs}", flush=True)
+        if pairs:
+            figures["tick_alone_ms"] = spread(np.concatenate(alone), 2)
+            figures["tick_with_page_ms"] = spread(np.concatenate(seen), 2)
+            ratios = [np.median(b) / np.median(a) for a, b in zip(alone, seen, strict=True)]
+            figures["ratio_of_medians"] = round(float(np.median(ratios)), 3)
+        with served(stack.link) as page, chromium(fence) as browser:
+            if opens:
+                tick_ms(theatre, 1)  # so that there is tissue to draw
+                figures["first_picture_s"] = spread(
+                    measure_first_picture(browser, page.address, opens), 2
+                )
+            if stops:
+                surgeon = SurgeonsPage(browser, page.address, scene=scene)
+                surgeon.is_live()
+                acknowledged, at_rest = measure_stops(
+                    theatre, surgeon, stops, 1, lambda n: print(f"stop {n} of {stops}", flush=True)
+                )
+                figures["acknowledged_ms"] = spread(acknowledged)
+                figures["at_rest_ms"] = spread(at_rest)
+                surgeon.close()
+    fence.close()
+    return figures
+
+
+def main() -> None:
+    one_thread()
+    parser = argparse.ArgumentParser(prog="fras bench page", description=__doc__)
+    parser.add_argument("--stops", type=int, default=200)
+    parser.add_argument("--pairs", type=int, default=6, help="trials without and with a page")
+    parser.add_argument("--opens", type=int, default=10)
+    parser.add_argument("--scene", action="store_true", help="draw the scene during the stops, too")
+    parser.add_argument("--json", type=Path, help="also write the figures there")
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as name:
+        figures = measure_page(
+            Path(name), options.stops, options.pairs, options.opens, scene=options.scene
+        )
+    width = max(map(len, figures))
+    for what, value in figures.items():
+        print(f"{what:{width}}  {value}")
+    if options.json:
+        options.json.write_text(json.dumps(figures, indent=2) + "\n")
+
+
+if __name__ == "__main__":
+    main()
