@@ -1,8 +1,10 @@
 """`fras bench`: what there is, what there is not, and the benchmarks' own options."""
 
 import importlib.util
+import runpy
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import pytest
 from typer.testing import CliRunner
@@ -17,12 +19,37 @@ def test_the_list_names_every_benchmark():
     assert all(f"fras bench {name}" in shown.output for name in bench.BENCHMARKS)
 
 
+@pytest.fixture
+def here(monkeypatch):
+    """Run in this process what has one of its own: what all of them load is loaded once."""
+
+    def run(command, env, check):
+        executable, flag, module, *arguments = command
+        assert (executable, flag, check) == (sys.executable, "-m", False)
+        assert env
+        monkeypatch.setattr(sys, "argv", [module, *arguments])
+        with pytest.raises(SystemExit) as ended:
+            runpy.run_module(module, run_name="__main__")
+        return SimpleNamespace(returncode=ended.value.code)
+
+    monkeypatch.setattr(bench, "subprocess", SimpleNamespace(run=run))
+
+
+# Of one that another one uses too.
+@pytest.mark.filterwarnings("ignore:.*found in sys.modules:RuntimeWarning")
+@pytest.mark.usefixtures("here")
 @pytest.mark.parametrize("name", bench.BENCHMARKS)
 def test_each_takes_options_of_its_own(name, capfd):
-    if name in ("fe", "motion") and importlib.util.find_spec("matplotlib") is None:
+    if name in ("fe", "motion", "hosts") and importlib.util.find_spec("matplotlib") is None:
         pytest.skip("matplotlib is not installed")
     assert bench.run_benchmark(name, ["--help"]) == 0
     assert f"usage: fras bench {name}" in capfd.readouterr().out
+
+
+def test_one_of_the_checkout_has_a_process_of_its_own(capfd, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    assert bench.run_benchmark("criteria", ["--help"]) == 0
+    assert "usage: fras bench criteria" in capfd.readouterr().out
 
 
 def test_options_reach_it_through_the_command(capfd):
@@ -40,7 +67,8 @@ def test_an_unknown_one_is_named_with_the_known_ones():
     with pytest.raises(
         bench.UnknownBenchmark,
         match=(
-            r"'fee'.*fe, mesh, stress, planner, criteria, awareness, motion, recorder, replay, loop"
+            r"'fee'.*fe, mesh, stress, planner, criteria, awareness, motion, recorder, log, "
+            r"replay, secure, fuzz, soak, page, loop, start, hosts"
         ),
     ):
         bench.run_benchmark("fee", [])

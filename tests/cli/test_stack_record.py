@@ -29,7 +29,7 @@ def test_record_is_found_while_its_process_lives(tmp_path: Path) -> None:
         runtime.require("local")
 
 
-@pytest.mark.parametrize("pid", [os.getpid(), 2**22 + 1])
+@pytest.mark.parametrize("pid", [os.getpid(), 2**22 + 1], ids=["given_to_another", "gone"])
 def test_record_of_a_process_that_is_gone_is_removed(tmp_path: Path, pid: int) -> None:
     """Also where its process id was given to another one, which started at another time."""
     runtime.keep("local", "tcp/127.0.0.1:1", tmp_path)
@@ -97,3 +97,19 @@ def test_the_note_of_a_run_that_was_killed_is_removed(tmp_path: Path) -> None:
         path.write_text(text.replace(str(psutil.Process().create_time()), "1.5"))
         assert runtime.all_of("local") == []
         assert not path.exists()
+
+
+def test_a_folder_in_which_others_may_write_is_refused(tmp_path: Path) -> None:
+    """Who can plant a record there says where a stop goes, and whom `fras down` ends."""
+    folder = runtime.runtime_dir()
+    folder.chmod(0o777)
+    with pytest.raises(runtime.BadRuntimeFolder, match="somebody else may write here"):
+        runtime.find("local")
+    folder.chmod(0o700)
+    assert runtime.find("local") is None
+    folder.rmdir()
+    mine = tmp_path / "elsewhere"
+    mine.mkdir(mode=0o700)
+    folder.symlink_to(mine)
+    with pytest.raises(runtime.BadRuntimeFolder):
+        runtime.find("local")

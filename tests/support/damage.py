@@ -1,6 +1,7 @@
 """A signed log that a real `LogFile` wrote, to be damaged, and what is in it."""
 
 import io
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,8 +20,12 @@ from fras_common.messages import (
     TissueState,
     Verdict,
 )
-from fras_log import LogFile, Signer
+from fras_log import AuditLog, LogFile, Signer, Verification
+from support import verdicts
 from support.forger import ChunkPiece, chunks, take_apart
+
+Verify = Callable[[bytes], Verification]
+"""Verifies bytes as a file of a log whose signer is known."""
 
 TRIAL = "t-1"
 START_NS = 1_760_000_000_000_000_000
@@ -44,12 +49,8 @@ class Message(NamedTuple):
 
 
 def verdict(tick: int, **changes: Any) -> Verdict:
-    made = Verdict(
-        tick=tick, level="ok", ok=True, reason="", max_force_n=0.01 * tick, limit_n=0.5,
-        hard_limit_n=1.0, visibility=0.1, visible=False, max_height=[], force_rate_n_s=0.0,
-        crossing_tick=-1, max_node_speed_m_s=0.0, grasped={},
-    )  # fmt: skip
-    return msgspec.structs.replace(made, **changes)
+    told: dict[str, Any] = {"max_force_n": 0.01 * tick, "visibility": 0.1, **changes}
+    return verdicts.verdict(tick, **told)
 
 
 def robot(tick: int) -> RobotState:
@@ -79,7 +80,7 @@ def tissue(tick: int, nodes: int = 16) -> TissueState:
 class Recording:
     """Stamps messages and writes them as they would arrive."""
 
-    def __init__(self, file: LogFile) -> None:
+    def __init__(self, file: LogFile | AuditLog) -> None:
         self.file = file
         self.now_ns = START_NS
         self._seqs: dict[str, int] = {}

@@ -6,7 +6,7 @@ It shares nothing with the code under test but the library's own records for the
 import struct
 import zlib
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from io import BytesIO
 
@@ -42,11 +42,17 @@ class Piece:
     end: int = -1
 
 
+class Garbage(Piece):
+    """A record that the forger puts in without a look into it."""
+
+
 @dataclass
 class ChunkPiece(Piece):
-    """A chunk with the records in it."""
+    """A chunk with the records in it; `behind` come in the file after the index of its messages."""
 
     inside: list[Piece] = field(default_factory=list[Piece])
+    behind: list[MessageIndex] = field(default_factory=list[MessageIndex])
+    times: tuple[int, int] | None = None
 
     @property
     def messages(self) -> list[Piece]:
@@ -120,6 +126,10 @@ def _stream(content: bytes) -> ReadDataStream:
     return ReadDataStream(BytesIO(content))
 
 
+Groups = dict[Opcode, list[McapRecord]]
+"""The index of a file, by kind of record."""
+
+
 class _Rebuilt:
     def __init__(self) -> None:
         self.data = bytearray(MAGIC)
@@ -135,13 +145,15 @@ class _Rebuilt:
         self.data += struct.pack("<BQ", opcode, len(content)) + content
         return offset
 
-    def add_chunk(self, inside: list[Piece]) -> None:
-        body = bytearray()
+    def add_chunk(self, chunk: ChunkPiece) -> None:
+        inside, body = chunk.inside, bytearray()
         entries: dict[int, list[tuple[int, int]]] = {}
         for piece in inside:
             if piece.opcode == Opcode.MESSAGE:
                 number, _, log_time = struct.unpack_from("<HIQ", piece.content)
                 entries.setdefault(number, []).append((log_time, len(body)))
+            elif isinstance(piece, Garbage):
+                pass
             elif piece.opcode == Opcode.SCHEMA:
                 schema = Schema.read(_stream(piece.content))
                 self.schemas[schema.id] = schema
@@ -151,16 +163,18 @@ class _Rebuilt:
             body += struct.pack("<BQ", piece.opcode, len(piece.content)) + piece.content
         packed = zstandard.compress(bytes(body))
         times = [log_time for one in entries.values() for log_time, _ in one]
-        head = struct.pack("<QQQI", min(times), max(times), len(body), zlib.crc32(body))
+        first, last = chunk.times or (min(times), max(times))
+        head = struct.pack("<QQQI", first, last, len(body), zlib.crc32(body))
         content = head + struct.pack("<I", 4) + b"zstd" + struct.pack("<Q", len(packed)) + packed
         offset = self.add(Opcode.CHUNK, content)
         offsets: dict[int, int] = {}
         index_start = len(self.data)
-        for number, records in entries.items():
-            self.counts[number] += len(records)
+        own = [MessageIndex(number, records) for number, records in entries.items()]
+        for one in [*own, *chunk.behind]:
+            self.counts[one.channel_id] += len(one.records)
             builder = RecordBuilder()
-            MessageIndex(channel_id=number, records=records).write(builder)
-            offsets[number] = self.add(Opcode.MESSAGE_INDEX, builder.end()[9:])
+            one.write(builder)
+            offsets[one.channel_id] = self.add(Opcode.MESSAGE_INDEX, builder.end()[9:])
         self.chunks.append(
             ChunkIndex(
                 chunk_start_offset=offset,
@@ -168,8 +182,8 @@ class _Rebuilt:
                 compression="zstd",
                 compressed_size=len(packed),
                 uncompressed_size=len(body),
-                message_start_time=min(times),
-                message_end_time=max(times),
+                message_start_time=first,
+                message_end_time=last,
                 message_index_offsets=offsets,
                 message_index_length=len(self.data) - index_start,
             )
@@ -177,7 +191,7 @@ class _Rebuilt:
 
     def add_piece(self, piece: Piece) -> None:
         if isinstance(piece, ChunkPiece):
-            self.add_chunk(piece.inside)
+            self.add_chunk(piece)
             return
         content = piece.content
         if piece.opcode == Opcode.ATTACHMENT:
@@ -201,7 +215,7 @@ class _Rebuilt:
                 )
             )
 
-    def finish(self) -> bytes:
+    def finish(self, forge: Callable[[Groups], None]) -> bytes:
         builder = RecordBuilder()
         DataEnd(zlib.crc32(self.data)).write(builder)
         self.data += builder.end()
@@ -217,16 +231,17 @@ class _Rebuilt:
             metadata_count=len(self.metadata),
             schema_count=len(self.schemas),
         )
-        groups: list[tuple[Opcode, Sequence[McapRecord]]] = [
-            (Opcode.SCHEMA, list(self.schemas.values())),
-            (Opcode.CHANNEL, list(self.channels.values())),
-            (Opcode.STATISTICS, [statistics]),
-            (Opcode.CHUNK_INDEX, self.chunks),
-            (Opcode.ATTACHMENT_INDEX, self.attachments),
-            (Opcode.METADATA_INDEX, self.metadata),
-        ]
+        groups: Groups = {
+            Opcode.SCHEMA: [*self.schemas.values()],
+            Opcode.CHANNEL: [*self.channels.values()],
+            Opcode.STATISTICS: [statistics],
+            Opcode.CHUNK_INDEX: [*self.chunks],
+            Opcode.ATTACHMENT_INDEX: [*self.attachments],
+            Opcode.METADATA_INDEX: [*self.metadata],
+        }
+        forge(groups)
         offsets: list[SummaryOffset] = []
-        for opcode, records in groups:
+        for opcode, records in groups.items():
             before = builder.count
             for record in records:
                 record.write(builder)
@@ -246,12 +261,17 @@ class _Rebuilt:
         return bytes(self.data) + summary + builder.end() + MAGIC
 
 
-def put_together(pieces: list[Piece]) -> bytes:
-    """A file of these records, with index, counts and every checksum made anew."""
+def put_together(
+    pieces: list[Piece], forge: Callable[[Groups], None] = lambda groups: None
+) -> bytes:
+    """A file of these records, with index, counts and every checksum made anew.
+
+    `forge` changes what the index says before it is written.
+    """
     rebuilt = _Rebuilt()
     for piece in pieces:
         rebuilt.add_piece(piece)
-    return rebuilt.finish()
+    return rebuilt.finish(forge)
 
 
 def repair_checksums(data: bytes) -> bytes:

@@ -8,6 +8,7 @@ from fras_common.bus import RawSample
 from fras_common.codec import decode, encode, read_header
 from fras_common.topics import topic_of
 from fras_log import LogFile, LogReader
+from fras_log.attachments import read_attachments
 
 # A message of the key in; what stands in the forged log out, or None to leave it out.
 Change = Callable[[Any], Any]
@@ -18,10 +19,11 @@ def rewrite(log: Path, out: Path, key: str, change: Change) -> Path:
     topic = topic_of(key)
     assert topic is not None
     reader = LogReader(log)
+    attachments = read_attachments(log)
     file: LogFile | None = None
     for message in reader.messages():
         if file is None:
-            file = LogFile(out, reader.metadata, {}, 0)
+            file = LogFile(out, reader.metadata, attachments, 0)
         payload = message.payload
         if message.key == key:
             changed = change(decode(topic.type, payload, key))

@@ -1,6 +1,7 @@
 """A client that leads the arms of a stack under the keys of CRTK, over its bus."""
 
 import threading
+import time
 from collections.abc import Callable
 from math import dist, inf
 from typing import Any
@@ -44,6 +45,8 @@ class Leader:
         topics: list[Topic[Any]] = []
         for keys in CRTK:
             topics += [keys.state_command, keys.servo_jp, keys.move_cp, keys.jaw_servo_jp]
+        # Of others before it there may be faults, too, and publishers still have them.
+        self._began_ns = time.time_ns()
         self._publishers = {topic.key: bus.publisher(topic) for topic in topics}
         bus.subscribe(FAULT.of(service=driver), self._on_fault)
         for keys in CRTK:
@@ -123,6 +126,8 @@ class Leader:
         bus.subscribe(topic, on_message)
 
     def _on_fault(self, fault: FaultRecord) -> None:
+        if fault.stamp_ns < self._began_ns:
+            return
         with self._changed:
             self.faults.append(fault)
             self._changed.notify_all()

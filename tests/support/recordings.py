@@ -19,6 +19,7 @@ from fras_common.messages import (
 from fras_common.messages.robot import ActionState
 from fras_common.messages.sa import Level
 from fras_log import LogFile
+from support import verdicts
 
 PACKED = "application/msgpack"
 TRIAL = "t-1"
@@ -44,12 +45,9 @@ def robot(tick: int, action: ActionState | None = None, trial: str = TRIAL) -> R
 
 
 def verdict(tick: int, level: Level = "ok") -> Verdict:
-    return Verdict(
-        tick=tick, trial=TRIAL, seq=tick, source="sa/old", stamp_ns=tick, level=level,
-        ok=level == "ok", reason="", max_force_n=0.51, limit_n=0.5, hard_limit_n=1.0,
-        visibility=0.0, visible=False, max_height=[], force_rate_n_s=0.0, crossing_tick=-1,
-        max_node_speed_m_s=0.0, grasped={},
-    )  # fmt: skip
+    return verdicts.verdict(
+        tick, TRIAL, level, seq=tick, source="sa/old", stamp_ns=tick, max_force_n=0.51
+    )
 
 
 def plan(reason: str, seq: int = 0) -> Plan:

@@ -21,17 +21,34 @@ class ShellBench:
         Makes the shell on its host.
     client : str
         Source that the client's messages bear.
+    fabric : MemoryFabric, optional
+        One that others are on already.
+    instance : str
+        Of the shell's process: each life has its own.
     """
 
-    def __init__(self, name: str, build: Callable[[ServiceHost], Service], client: str) -> None:
-        self.fabric = fabric = MemoryFabric()
+    def __init__(
+        self,
+        name: str,
+        build: Callable[[ServiceHost], Service],
+        client: str,
+        fabric: MemoryFabric | None = None,
+        instance: str = "test",
+    ) -> None:
+        self.fabric = fabric = fabric or MemoryFabric()
         self.client = MemoryBus(fabric, "cell", client)
-        self.fabric = fabric
+        self._peers: dict[str, MemoryBus] = {}
         self.host = ServiceHost(name)
         self.host.attach(
-            MemoryBus(fabric, "cell", f"{name}/test", on_malformed=self.host.count_malformed)
+            MemoryBus(fabric, "cell", f"{name}/{instance}", on_malformed=self.host.count_malformed)
         )
         self.service = build(self.host)
+
+    def peers(self, topic: Any) -> Any:
+        """Publisher of a topic, as the service that the table says."""
+        if topic.producer not in self._peers:
+            self._peers[topic.producer] = MemoryBus(self.fabric, "cell", f"{topic.producer}/test")
+        return self._peers[topic.producer].publisher(topic)
 
     def heard(self, topic: Any) -> list[Any]:
         """List that fills with the messages of a key."""
@@ -44,6 +61,10 @@ class ShellBench:
         self.service.wake()
         while self.host.drain(0.0):
             self.service.wake()
+
+    def kill(self) -> None:
+        """End the shell without a word, its caches and tokens with it."""
+        self.host.bus.close()
 
     def ask(self, query: Any, request: Any) -> list[Any]:
         """Ask; the list fills when the answer comes, now or later."""
@@ -62,4 +83,5 @@ class ShellBench:
     def close(self) -> None:
         """Leave the bus."""
         self.host.bus.close()
-        self.client.close()
+        for bus in (self.client, *self._peers.values()):
+            bus.close()

@@ -6,15 +6,17 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import psutil
 import pytest
 
+from fras_cli.app import main
 from fras_cli.options import build_trial
-from fras_cli.report import Summary, write_report
-from fras_cli.stack import UsedStack, own_stack
+from fras_cli.report import Summary, read_trial, summarise
+from fras_cli.stack import Layout, UsedStack, own_stack
 from fras_cli.trial import TrialFollower, TrialView
 from fras_common.scenario import Scenario
 
@@ -38,7 +40,7 @@ def eventually(condition: Callable[[], Any], what: str = "") -> Any:
     raise AssertionError(f"not within {PATIENCE_S} s: {what or condition}")
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def wait_until() -> Callable[[Callable[[], Any], str], Any]:
     """Wait until a condition gives something true."""
     return eventually
@@ -52,6 +54,7 @@ class Trials:
         self.follower = TrialFollower(stack)
         self._folder = folder
         self._count = 0
+        self._kept: dict[Any, tuple[Summary, Path]] = {}
 
     def start(self, scenario: Scenario, mesh: bytes = b"") -> Path:
         """Begin a trial; returns its folder."""
@@ -61,13 +64,25 @@ class Trials:
         return folder
 
     def run(
-        self, name: str, look: Callable[[TrialView], None] = lambda view: None, **options: Any
+        self,
+        name: str,
+        look: Callable[[TrialView], None] = lambda view: None,
+        pace: float = 0,
+        **options: Any,
     ) -> tuple[Summary, Path]:
         """Run a trial to its end; returns its summary and its log."""
-        trial = build_trial(name, pace=0, **options)
+        trial = build_trial(name, pace=pace, **options)
         folder = self.start(trial.scenario, trial.mesh)
         assert self.follower.follow(look, stop=lambda: False)
-        return write_report(folder / "audit.mcap", folder), folder / "audit.mcap"
+        log = folder / "audit.mcap"
+        return summarise(read_trial(log)), log
+
+    def kept(self, name: str, **options: Any) -> tuple[Summary, Path]:
+        """Run a trial that nobody disturbs, once for all tests that only read what it left."""
+        key = (name, *sorted(options.items()))
+        if key not in self._kept:
+            self._kept[key] = self.run(name, **options)
+        return self._kept[key]
 
 
 @pytest.fixture(scope="session")
@@ -75,6 +90,21 @@ def trials(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Trials]:
     """Run trials through a stack that all tests of a session share."""
     folder = tmp_path_factory.mktemp("stack")
     with own_stack("system-tests", None, folder / "logs") as stack:
+        yield Trials(stack, folder)
+
+
+@pytest.fixture(scope="session")
+def quiet(trials: Trials) -> Path:
+    """Log of a small trial that nothing happened to; the same on any stack."""
+    return trials.kept("a", mesh="11,13,2")[1]
+
+
+@pytest.fixture(scope="module")
+def secure_trials(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Trials]:
+    """Run trials through a stack with certificates, made as it starts."""
+    folder = tmp_path_factory.mktemp("secure")
+    layout = Layout(keys=folder / "keys")
+    with own_stack("secure-tests", None, folder / "logs", layout=layout) as stack:
         yield Trials(stack, folder)
 
 
@@ -137,6 +167,33 @@ def fras(tmp_path: Path) -> Iterator[Callable[..., Command]]:
         if command.process.poll() is None:
             command.process.kill()
             command.process.wait()
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a command ended, and what it said to the terminal."""
+
+    status: int
+    text: str
+
+
+@pytest.fixture
+def fras_here(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Callable[..., Ended]:
+    """Run a `fras` command in this process, where the promise is not about a process."""
+    for name, value in {"XDG_RUNTIME_DIR": str(tmp_path), "COLUMNS": "200"}.items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments: str) -> Ended:
+        monkeypatch.setattr(sys, "argv", ["fras", *arguments])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        said = capsys.readouterr()
+        return Ended(int(ended.value.code or 0), said.out + said.err)
+
+    return run
 
 
 def last_json(text: str) -> dict[str, Any]:

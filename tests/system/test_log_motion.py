@@ -13,50 +13,38 @@ from fras_cli.trial import TrialView
 from support.motion_audit import CHECKS, audit
 from support.motion_log import MotionLog, phases, read_motion
 
-# The pull crosses both limits at once, so that the hard one decides.
-HARD = """\
-seed = 20
-[awareness]
-hard_limit_n = 0.5
-visible_fraction = 0.995
-[planner]
-max_replans = 1
-"""
+HARD = Path(__file__).parent / "hard.toml"
 
 
-def press_stop_once(trials: Any) -> Callable[[TrialView], None]:
-    """Hold in the middle of a descent, and lift the hold when the arms rest."""
+def stop_in_mid_motion(trials: Any) -> Callable[[TrialView], None]:
+    """Hold in the middle of a traverse, and lift the hold when the arms have stopped."""
     from fras_common.messages import HoldRequest, ResumeRequest
     from fras_common.topics import HOLD, RESUME
 
     bus = trials.stack.link.bus
     held: list[int] = []
-    looks: list[int] = []
+    lifted: list[int] = []
 
     def look(view: TrialView) -> None:
-        if view.robot is None or view.robot.action is None or len(looks) >= 2:
+        state = view.robot
+        if lifted or state is None or state.action is None:
             return
-        if not held and view.robot.action.phase == "descend":
+        if not held and state.action.phase == "traverse" and state.tick >= 20:  # at full speed
             held.append(bus.query(HOLD, HoldRequest(holder="cli", reason="test"), 5.0).tick)
-        elif held:
-            tick = view.robot.tick
-            looks[:] = [*(one for one in looks if one == tick), tick]
-            if len(looks) >= 2:
-                bus.query(RESUME, ResumeRequest(holder="cli", by="cli"), 5.0)
+        elif held and state.action.phase in ("stop", "held"):
+            lifted.append(bus.query(RESUME, ResumeRequest(holder="cli", by="cli"), 5.0).tick)
 
     return look
 
 
 @pytest.fixture(scope="module")
-def logs(trials: Any, tmp_path_factory: pytest.TempPathFactory) -> dict[str, MotionLog]:
+def logs(trials: Any) -> dict[str, MotionLog]:
     """Trials that cross the soft and the hard limit, release and grasp anew, and are held."""
-    hard = tmp_path_factory.mktemp("scenarios") / "hard.toml"
-    hard.write_text(HARD)
     ran: dict[str, tuple[Any, Path]] = {
-        "soft": trials.run("b"),
-        "hard": trials.run(str(hard)),
-        "release": trials.run("c"),
-        "held": trials.run("a", press_stop_once(trials)),
+        "soft": trials.kept("b"),
+        "hard": trials.kept(str(HARD)),
+        "release": trials.kept("c"),
+        "held": trials.run("a", stop_in_mid_motion(trials), pace=1, mesh="11,13,2"),
     }
     return {name: read_motion(log) for name, (_, log) in ran.items()}
 

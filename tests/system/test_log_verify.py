@@ -15,7 +15,7 @@ from fras_cli.report import read_trial
 
 @pytest.mark.parametrize("name", ["a", "b", "c"])
 def test_what_was_done_is_in_the_log_and_keeps_to_all(trials: Any, name: str) -> None:
-    summary, log = trials.run(name)
+    summary, log = trials.kept(name)
     history = executed_history(read_trial(log))
     assert [step[0] for step in history.values()] == summary.actions
     assert summary.violations == []
@@ -24,7 +24,7 @@ def test_what_was_done_is_in_the_log_and_keeps_to_all(trials: Any, name: str) ->
 
 def test_an_action_that_breaks_one_is_told(trials: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """The same trial, had it grasped with its gripper closed."""
-    _, log = trials.run("a")
+    _, log = trials.kept("a")
     trial = read_trial(log)
     contexts = list(trial.contexts)
     arm = trial.results[1].arm
@@ -43,7 +43,7 @@ def test_an_action_that_breaks_one_is_told(trials: Any, monkeypatch: pytest.Monk
 def test_a_log_without_what_led_to_an_action_is_named(
     trials: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    _, log = trials.run("a")
+    _, log = trials.kept("a")
     cut = dataclasses.replace(read_trial(log), contexts=())
     monkeypatch.setattr("fras_cli.log_verify.read_trial", lambda _: cut)
     with pytest.raises(LogIncomplete, match="what led to action g1"):
@@ -51,7 +51,7 @@ def test_a_log_without_what_led_to_an_action_is_named(
 
 
 def test_a_log_that_is_damaged_or_cut_off_is_not_certified(trials: Any, tmp_path: Path) -> None:
-    _, log = trials.run("a")
+    _, log = trials.kept("a")
     whole = log.read_bytes()
     flipped = bytearray(whole)
     flipped[len(whole) // 2] ^= 0xFF
@@ -67,7 +67,7 @@ def test_a_log_that_is_damaged_or_cut_off_is_not_certified(trials: Any, tmp_path
 def test_an_action_that_no_executive_numbered_is_named(
     trials: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    _, log = trials.run("a")
+    _, log = trials.kept("a")
     trial = read_trial(log)
     foreign = msgspec.structs.replace(trial.results[0], goal_id="mine")
     forged = dataclasses.replace(trial, results=(foreign, *trial.results[1:]))

@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 
 from fras_cli.options import build_scenario
@@ -39,10 +40,14 @@ from fras_common.topics import (
     REPLAY_STATUS,
 )
 from fras_log.scan import Recorded, scan
+from fras_replay import LiveCell
 
 Fras = Callable[..., Any]
 Wait = Callable[[Callable[[], Any], str], Any]
 WAIT_S = 30.0
+MESH = "11,13,2"
+# On this mesh scenario B crosses it, and not its own.
+LIMIT_N = 0.2
 # What those say of themselves who record and replay.
 OWN = {
     "health/replay", "log/replay", "health/recorder", "log/recorder", "recorder/status",
@@ -54,8 +59,11 @@ OWN = {
 @pytest.fixture(scope="session")
 def recorded_trial(trials: Any) -> Path:
     """Log of a trial that crosses its limit and plans anew."""
-    _, log = trials.run("b")
-    return log
+    scenario = build_scenario("b", pace=0, mesh=MESH)
+    low = msgspec.structs.replace(scenario.awareness, force_limit_n=LIMIT_N)
+    folder = trials.start(msgspec.structs.replace(scenario, awareness=low))
+    assert trials.follower.follow(lambda view: None, stop=lambda: False)
+    return folder / "audit.mcap"
 
 
 @pytest.fixture
@@ -120,7 +128,10 @@ def test_a_record_of_a_replay_is_the_record_of_the_trial(
     with recorder(cell, connect):
         wait_until(lambda: any("recorder" in t for t in client.bus.tokens(WAIT_S)), "the recorder")
         opened = OpenRequest(
-            trial="trial-again", scenario=build_scenario("b"), mesh=b"", directory=str(tmp_path)
+            trial="trial-again",
+            scenario=build_scenario("b", mesh=MESH),
+            mesh=b"",
+            directory=str(tmp_path),
         )
         client.bus.query(RECORDER_OPEN, opened, WAIT_S)
         command = fras(
@@ -235,14 +246,17 @@ def test_a_log_that_was_cut_is_replayed_as_far_as_it_goes(
     assert f"{count} of {count} messages" in command.text
 
 
-def test_killed_it_leaves_no_process(recorded_trial: Path, fras: Fras, wait_until: Wait) -> None:
+def test_killed_it_leaves_no_process(
+    recorded_trial: Path, fras: Fras, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    wait_until: Wait,
+) -> None:  # fmt: skip
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     command = fras("replay", str(recorded_trial), "--loop")
     command.until("replaying")
     assert any("fras_common.router" in one.cmdline() for one in command.note_family())
     # Beside it, with a router of its own, another one would have the cell to itself.
-    other = fras("replay", str(recorded_trial))
-    assert other.end() == 3
-    assert f"process {command.process.pid}" in other.text
+    with pytest.raises(LiveCell, match=f"process {command.process.pid} "):
+        router_of("replay", None, lambda: False).__enter__()
     os.kill(command.process.pid, signal.SIGKILL)
     command.end()
     wait_until(command.alone, "all processes gone")

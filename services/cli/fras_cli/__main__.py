@@ -2,13 +2,14 @@
 
 import sys
 
-from fras_common.service.extras import MissingExtra, require_extra
+from fras_common.extras import MissingExtra, require_extra
+from fras_common.signals import silent_interrupt
 
 
 def main() -> None:
     """Run the command, or say what to install for it."""
     try:
-        with require_extra("cli"):
+        with silent_interrupt(), require_extra("cli"):
             from fras_cli.app import main as run
     except MissingExtra as error:
         print(f"fras: {error}", file=sys.stderr)

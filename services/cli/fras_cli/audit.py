@@ -15,7 +15,7 @@ from rich.table import Table
 
 from fras_cli.run import EXIT_BAD_INPUT, EXIT_NOT_SUCCESS, EXIT_OK
 from fras_common.errors import FrasError
-from fras_common.service.extras import require_extra
+from fras_common.extras import require_extra
 
 # An audit that is over by then says nothing on the way.
 QUIET_S = 2.0

@@ -26,8 +26,27 @@ BENCHMARKS: dict[str, tuple[str, str]] = {
         "benchmarks.recorder",
         "Writing and verifying a log against the bare library; loss at 50 times a trial's rate.",
     ),
+    "log": (
+        "benchmarks.log",
+        "Verifying, auditing and exporting a trial against the trial's own time.",
+    ),
     "replay": ("benchmarks.replay", "How late a replay's messages go out, and how fast at most."),
+    "secure": ("benchmarks.secure", "What certificates and access control cost a tick."),
+    "fuzz": (
+        "benchmarks.fuzz",
+        "Hostile input against decoders, services, a trial and readers of files.",
+    ),
+    "soak": (
+        "benchmarks.soak",
+        "Memory, descriptors, threads and files over many trials of one stack.",
+    ),
+    "page": ("benchmarks.page", "The surgeon's page: stops, what it costs a tick, first picture."),
     "loop": ("benchmarks.loop", "A tick of all services against three raw Zenoh hops."),
+    "start": ("benchmarks.start", "How long a stack takes to be ready, and what its processes do."),
+    "hosts": (
+        "benchmarks.hosts",
+        "A tick over two hosts, by the round trip between them.",
+    ),
 }
 
 

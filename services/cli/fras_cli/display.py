@@ -50,9 +50,15 @@ class LiveDisplay:
         if self._console.is_terminal:
             self._live.stop()
 
+    def pause(self) -> None:
+        """Draw nothing until the next `show`: something else is written there."""
+        if self._console.is_terminal:
+            self._live.stop()
+
     def show(self, view: TrialView) -> None:
         """Draw the view."""
         if self._console.is_terminal:
+            self._live.start()
             self._live.update(render(view))
             return
         line = f"stopped by {view.holds} (`fras resume`)" if view.holds else action_line(view)
@@ -66,6 +72,8 @@ def action_line(view: TrialView) -> str:
     task = view.task
     if task is None:
         return "starting the trial"
+    if task.phase == "awaiting_approval":
+        return f"plan {task.plan} waits for approval (`fras approve`, `fras reject`)"
     if task.phase != "acting":
         return PHASE_WORDS[task.phase]
     name, _, arguments = task.action.partition("(")

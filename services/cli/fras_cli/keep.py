@@ -1,4 +1,4 @@
-"""`fras up|down|status|stop|resume|why-not`: a stack that stays, and what one does to it."""
+"""`fras up|down|stop|resume|why-not`: a stack that stays, and what one does to it."""
 
 import signal
 import sys
@@ -8,29 +8,25 @@ from pathlib import Path
 import psutil
 from rich.console import Console
 from rich.markup import escape
-from rich.table import Table
 
 from fras_cli import runtime
 from fras_cli.link import Link
-from fras_cli.run import EXIT_OK, EXIT_STACK, caught_interrupts
+from fras_cli.other_hosts import OtherHosts
+from fras_cli.plan_words import HOLDER
+from fras_cli.run import EXIT_OK, EXIT_STACK, caught_interrupts, supervisor_lines
 from fras_cli.stack import USUAL, Layout, own_stack
 from fras_common.errors import FrasError
-from fras_common.messages import (
-    Health,
-    HoldRequest,
-    HoldState,
-    ResumeRequest,
-    TaskStatus,
-    WhyNotRequest,
-)
-from fras_common.topics import HEALTH, HOLD, RESUME, SERVICES, TASK_STATUS, WHY_NOT
+from fras_common.messages import HoldRequest, HoldState, ResumeRequest, WhyNotRequest
+from fras_common.topics import HOLD, RESUME, WHY_NOT
 from fras_supervisor import Console as Lines
 
-HOLDER = "cli"
 POLL_S = 0.2
 DOWN_TIMEOUT_S = 30.0
 QUERY_TIMEOUT_S = 5.0
-STATUS_WAIT_S = 1.5
+WHAT_NOW = (
+    "the rest runs on: `fras restart NAME` starts it again, and `fras resume --holder supervisor` "
+    "lets the arms go on"
+)
 
 
 class DownTimeout(FrasError):
@@ -38,11 +34,14 @@ class DownTimeout(FrasError):
 
 
 def up(cell: str, port: int, log_dir: Path, console: Console, layout: Layout = USUAL) -> int:
-    """Start a stack and keep it until Ctrl-C, `fras down`, or the death of a process."""
-    connect = f"tcp/127.0.0.1:{port}"
-    record = runtime.keep(cell, connect, log_dir)
+    """Start a stack and keep it until Ctrl-C or `fras down`; 3 if a process had been given up."""
+    gone = ""
+    here = f"host {layout.host}: " if layout.host else ""
+    names = list(layout.placed(port)[0].processes)
+    connect = f"{layout.protocol}/127.0.0.1:{port}"
+    record = runtime.keep(cell, connect, log_dir, layout.keys)
     try:
-        with caught_interrupts() as interrupts, Lines(sys.stdout, ["router", *SERVICES]) as echo:
+        with caught_interrupts() as interrupts, Lines(sys.stdout, names) as echo:
             began_s = time.monotonic()
 
             def stopping() -> bool:
@@ -56,21 +55,27 @@ def up(cell: str, port: int, log_dir: Path, console: Console, layout: Layout = U
                 echo=echo,
                 tell=console.print,
                 layout=layout,
+                report=supervisor_lines(console),
             )
             with started as stack:
                 console.print(
-                    f"ready after {time.monotonic() - began_s:.1f} s: cell {cell}, {connect}, "
-                    f"logs in {log_dir}; Ctrl-C or `fras down --cell {cell}` stops it"
+                    f"{here}ready after {time.monotonic() - began_s:.1f} s: cell {cell}, "
+                    f"{connect}, logs in {log_dir}; Ctrl-C or `fras down --cell {cell}` stops it"
                 )
+                others = OtherHosts(stack.elsewhere)
                 while not stopping():
-                    if gone := stack.watch():
-                        console.print(gone, style="bold red")
-                        return EXIT_STACK
+                    if said := others.look(stack.link.missing()):
+                        console.print(said, soft_wrap=True)
+                    if (now := stack.watch()) and now != gone:
+                        console.print(
+                            escape(f"{now}; {WHAT_NOW}"), style="bold red", soft_wrap=True
+                        )
+                    gone = now
                     time.sleep(POLL_S)
                 console.print("stopping", style="dim")
     finally:
         runtime.forget(record)
-    return EXIT_OK
+    return EXIT_STACK if gone else EXIT_OK
 
 
 def down(cell: str, console: Console) -> int:
@@ -112,56 +117,7 @@ def endpoint(cell: str, connect: str | None) -> str:
     """
     if connect is not None:
         return connect
-    records = runtime.require_any(cell)
-    if len(records) > 1:
-        places = ", ".join(record.connect for record in records)
-        raise runtime.SeveralStacks(
-            f"{len(records)} stacks run in cell {cell!r}: say which with --connect: {places}",
-            places=places,
-        )
-    return records[0].connect
-
-
-def status(cell: str, connect: str | None, console: Console) -> int:
-    """Print what runs in the cell: services, their health, and the task."""
-    place = endpoint(cell, connect)
-    health: dict[str, Health] = {}
-    tasks: list[TaskStatus] = []
-    with Link(cell, place, open_timeout_s=QUERY_TIMEOUT_S) as link:
-        link.bus.subscribe(HEALTH, lambda one: health.update({one.service: one}))
-        link.bus.subscribe(TASK_STATUS, tasks.append)
-        complete = link.wait_complete(STATUS_WAIT_S)
-        deadline_s = time.monotonic() + STATUS_WAIT_S
-        while len(health) < len(SERVICES) and time.monotonic() < deadline_s:
-            time.sleep(0.05)
-        tokens = link.tokens()
-    table = Table("service", "state", "memory", "cpu", "tick", "received", "dropped", "gaps")
-    for service in SERVICES:
-        one = health.get(service)
-        if one is None:
-            seen = "ready, no health yet" if f"ready/{service}" in tokens else "absent"
-            table.add_row(service, seen)
-            continue
-        table.add_row(
-            service,
-            one.state,
-            f"{one.rss_bytes / 1e6:.0f} MB",
-            f"{one.cpu_percent:.0f} %",
-            str(one.tick) if one.tick >= 0 else "-",
-            str(one.received),
-            str(one.malformed + one.refused + one.wrong_trial + one.queue_dropped),
-            str(one.gaps),
-        )
-    console.print(f"cell {cell} at {place}")
-    console.print(table)
-    if holds := health["motion"].facts.get("holds", "") if "motion" in health else "":
-        console.print(f"the arms are stopped by {holds}: lift it with `fras resume`")
-    if tasks:
-        task = tasks[-1]
-        console.print(
-            f"task {task.trial}: {task.phase} {task.action}{task.outcome} {task.reason}".rstrip()
-        )
-    return EXIT_OK if complete else EXIT_STACK
+    return runtime.require_one(cell).connect
 
 
 def hold(cell: str, connect: str | None, reason: str, console: Console) -> int:

@@ -3,10 +3,29 @@
 import threading
 import uuid
 from collections.abc import Callable
+from pathlib import Path
 
+from fras_cli import runtime
 from fras_common.bus import Bus
 from fras_common.bus.zenoh_bus import ZenohBus
+from fras_common.identity import Identity, default_keys_dir, identity_in
 from fras_common.topics import SERVICES
+
+NAME = "cli"
+
+
+def identity_for(name: str, cell: str, connect: str, keys: Path | None = None) -> Identity | None:
+    """Find what to show at an endpoint; None at one that asks for nothing.
+
+    Raises
+    ------
+    BadIdentity
+    """
+    if not connect.startswith("tls/"):
+        return None
+    known = (one.keys for one in runtime.all_of(cell) if one.connect == connect and one.keys)
+    noted = next(known, "")
+    return identity_in(keys or (Path(noted) if noted else default_keys_dir()), name)
 
 
 class Link:
@@ -19,12 +38,26 @@ class Link:
         Endpoint of the router.
     open_timeout_s : float
         How long to wait for the router.
+    keys : Path, optional
+        Folder of the certificate to show at a `tls/` endpoint; by default that of the stack that
+        this machine has there, else where keys are.
+    name : str
+        Whose certificate that is.
     """
 
-    def __init__(self, cell: str, connect: str, open_timeout_s: float = 10.0) -> None:
+    def __init__(
+        self,
+        cell: str,
+        connect: str,
+        open_timeout_s: float = 10.0,
+        keys: Path | None = None,
+        name: str = NAME,
+    ) -> None:
         self.cell = cell
         self.connect = connect
         self._open_timeout_s = open_timeout_s
+        self._keys = keys
+        self._name = name
         self._bus: Bus | None = None
         self._tokens: set[str] = set()
         self._changed = threading.Condition()
@@ -33,9 +66,12 @@ class Link:
     def bus(self) -> Bus:
         """The bus; opened by the first use."""
         if self._bus is None:
-            source = f"cli/{uuid.uuid4().hex[:4]}"
             self._bus = ZenohBus(
-                self.cell, self.connect, source, open_timeout_s=self._open_timeout_s
+                self.cell,
+                self.connect,
+                f"{self._name}/{uuid.uuid4().hex[:4]}",
+                open_timeout_s=self._open_timeout_s,
+                identity=identity_for(self._name, self.cell, self.connect, self._keys),
             )
             self._bus.watch_tokens(self._on_token)
         return self._bus

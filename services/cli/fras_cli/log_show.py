@@ -13,7 +13,8 @@ from rich.markup import escape
 
 from fras_common.codec import read_header
 from fras_common.errors import FrasError
-from fras_log.scan import Broken, Cut, Recorded, scan
+from fras_log.events import Broken, Cut, Recorded
+from fras_log.pieces import scan_log
 
 MOST_ITEMS = 8
 MOST_BYTES = 16
@@ -53,7 +54,7 @@ def show_log(
         Names the keys that there are.
     """
     keys: set[str] = set()
-    for event in scan(path):
+    for event in scan_log(path):
         if isinstance(event, Broken | Cut):
             console.print(f"damaged at offset {event.offset}: {escape(event.text)}", style="red")
         if not isinstance(event, Recorded):

@@ -4,6 +4,7 @@ import importlib
 import re
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
@@ -13,9 +14,10 @@ from fras_cli.report import Trial, read_trial
 from fras_cli.run import EXIT_NOT_SUCCESS
 from fras_common.errors import FrasError
 from fras_common.executed import history_step
+from fras_common.extras import require_extra
 from fras_common.messages import Plan
-from fras_common.service.extras import require_extra
 from fras_log import Verification, verify_file
+from fras_log.attachments import read_attachments, rules_in
 from fras_log.keys import trusted_keys
 
 
@@ -37,7 +39,7 @@ def verify_log(
     ----------
     path : Path
     asp_dir : Path or None
-        Specifications other than those that came with FRAS.
+        Specifications other than those attached to the log, or, without any, than FRAS's own.
     console : Console
     keys : sequence of Path
         Public keys whose signatures are trusted; this machine's own by default.
@@ -76,6 +78,9 @@ def _print_file(found: Verification, console: Console) -> None:
     for kind, count in found.beyond.items():
         console.print(f"{kind}: {count} more", style="red")
     console.print(f"{found.messages} messages, head {found.head}", soft_wrap=True)
+    for name in found.unfinished:
+        text = f"{name} was never finished: the recorder of the next file found it so, and went on."
+        console.print(escape(text), soft_wrap=True)
     if found.authentic:
         console.print(f"The log is authentic: intact, and signed with key {found.signed_by}.")
     elif found.intact and found.signed_by:
@@ -107,7 +112,10 @@ def _verify_trial(path: Path, asp_dir: Path | None, console: Console) -> bool:
         offline = importlib.import_module("fras_planner.offline")
     trial = read_trial(path)
     history = executed_history(trial)
-    broken: list[str] = offline.verify_history(history, asp_dir)
+    attached = rules_in(read_attachments(path), path) if asp_dir is None else {}
+    judged = offline.verify_history(history, asp_dir, attached, str(path))
+    console.print(escape(_whose(judged, asp_dir, trial, attached=bool(attached))), soft_wrap=True)
+    broken: list[str] = list(judged.broken)
     for sentence in broken:
         console.print(escape(sentence))
     said = trial.ending.violations if trial.ending is not None else None
@@ -125,18 +133,41 @@ def _verify_trial(path: Path, asp_dir: Path | None, console: Console) -> bool:
     return is_whole and list(said or []) == broken == []
 
 
+def _whose(judged: Any, asp_dir: Path | None, trial: Trial, *, attached: bool) -> str:
+    """Say by whose specifications was judged: one may promise less than another."""
+    digest = judged.asp_digest[:12]
+    if asp_dir is not None:
+        return f"Specifications: those in {asp_dir} (rules {digest})."
+    if attached:
+        same = (
+            "the same as this machine's"
+            if judged.ours
+            else f"NOT this machine's (rules {judged.our_digest[:12]}): --asp-dir takes others"
+        )
+        return f"Specifications: those attached to the log (rules {digest}), {same}."
+    others = sorted({plan.asp_digest[:12] for plan in trial.plans} - {digest})
+    planned = f"; it was planned by other rules ({', '.join(others)})" if others else ""
+    return f"Specifications: this machine's (rules {digest}), for the log attaches none{planned}."
+
+
 def executed_history(trial: Trial) -> dict[int, list[str]]:
     """Return for each action carried out what was sensed and asked for before it, and the action.
 
-    Action ``gK`` follows on context ``cK``: the executive asks for one before each, and numbers
-    both alike.
+    The planner tells of each by which context and plan it was done. Where it does not, action
+    ``gK`` follows on context ``cK``: it asks for one before each, and numbers both alike.
     """
+    done = {one.goal: one for status in trial.statuses for one in status.done}
     contexts = {context.request_id: context for context in trial.contexts}
+    plans = {plan.request_id: plan for plan in trial.plans}
     history: dict[int, list[str]] = {}
     for result in trial.results:
         number = _number("g", result.goal_id)
-        before = contexts.get(f"c{number}")
-        plan = _plan_of(number, trial.plans)
+        known = done.get(number)
+        if done and known is None and result.reason == "restart":
+            # Ended before it began: motion started again in that moment.
+            continue
+        before = contexts.get(known.context if known is not None else f"c{number}")
+        plan = plans.get(known.plan) if known is not None else _plan_of(number, trial.plans)
         if before is None or plan is None:
             raise LogIncomplete(
                 f"{trial.path}: what led to action {result.goal_id} is not in the log",

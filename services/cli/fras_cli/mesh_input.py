@@ -8,12 +8,13 @@ from pathlib import Path
 import msgspec
 
 from fras_common.errors import FrasError
+from fras_common.extras import MissingExtra
 from fras_common.messages import Fault
 from fras_common.scenario import MeshFacts, Scenario, ScenarioError, fit_to_mesh
-from fras_common.service.extras import MissingExtra
 
 CHECK_TIMEOUT_S = 120.0
-MAX_BYTES = 64 * 2**20
+# It travels by value, in a message with the scenario.
+MAX_BYTES = 60 * 2**20
 
 
 class MeshCheckFailed(FrasError):

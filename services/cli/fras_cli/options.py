@@ -129,6 +129,7 @@ def build_trial(
     no_limit: bool = False,
     criterion: str | None = None,
     mesh: str | None = None,
+    confirm: bool = False,
 ) -> TrialInput:
     """Read a scenario and its mesh, lay the options over it, check it, draw its scene if need be.
 
@@ -150,6 +151,8 @@ def build_trial(
         raw["planner"]["ignore_ap"] = True
     if no_limit:
         raw["awareness"]["no_limit"] = True
+    if confirm:
+        raw["planner"]["confirm"] = True
     if criterion is not None:
         raw["planner"]["criterion"] = criterion
     if mesh is not None:

@@ -12,7 +12,8 @@ from rich.table import Table
 
 from fras_cli.run import EXIT_BAD_INPUT
 from fras_common.errors import FrasError
-from fras_common.service.extras import require_extra
+from fras_common.extras import require_extra
+from fras_common.files import CONTEXTS_BYTES, read_at_most
 
 Row = dict[str, Any]
 
@@ -36,9 +37,9 @@ def plan(
     """
     with require_extra("planner"):
         offline = importlib.import_module("fras_planner.offline")
-    text = sys.stdin.buffer.read() if str(path) == "-" else path.read_bytes()
     rows: list[Row]
     try:
+        text = _read(path)
         rows, is_list = offline.plan_file(
             text,
             str(path),
@@ -59,6 +60,12 @@ def plan(
                 console.rule(f"context {number}")
             _print_row(row, console)
     return EXIT_BAD_INPUT if any("error" in row for row in rows) else 0
+
+
+def _read(path: Path) -> bytes:
+    if str(path) != "-":
+        return read_at_most(path, CONTEXTS_BYTES)
+    return sys.stdin.buffer.read(CONTEXTS_BYTES)
 
 
 def _print_row(row: Row, console: Console) -> None:

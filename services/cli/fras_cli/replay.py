@@ -5,7 +5,7 @@ import sys
 import tempfile
 import uuid
 from collections.abc import Callable, Generator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,13 +14,14 @@ from rich.console import Console
 from rich.markup import escape
 
 from fras_cli import runtime
+from fras_cli.link import identity_for
 from fras_cli.replay_keys import HELP, command_of, watched_terminal
 from fras_cli.run import EXIT_OK
 from fras_common.bus.zenoh_bus import ZenohBus
 from fras_common.errors import FrasError
 from fras_common.service import run_shell
 from fras_common.service.logs import configure_logging
-from fras_common.service.signals import StopFlag
+from fras_common.signals import StopFlag
 from fras_replay import (
     UNLIMITED,
     BadPlace,
@@ -76,8 +77,21 @@ class Wanted:
     remap: Sequence[str] = ()
 
 
-def replay(path: Path, wanted: Wanted, console: Console) -> int:
+def replay(
+    path: Path,
+    wanted: Wanted,
+    console: Console,
+    beside: Callable[[str], AbstractContextManager[None]] = lambda connect: nullcontext(),
+) -> int:
     """Replay a log.
+
+    Parameters
+    ----------
+    path : Path
+    wanted : Wanted
+    console : Console
+    beside : callable
+        Given the router's endpoint, what runs as long as the replay does.
 
     Returns
     -------
@@ -109,7 +123,7 @@ def replay(path: Path, wanted: Wanted, console: Console) -> int:
             console.print("what could be read of it is replayed", style="red")
         stop = StopFlag()
         stop.install()
-        with router_of(wanted.cell, wanted.connect, stop.is_set) as connect:
+        with router_of(wanted.cell, wanted.connect, stop.is_set) as connect, beside(connect):
             _run(recording, player, wanted, connect, console, stop)
     finally:
         recording.close()
@@ -192,6 +206,7 @@ def _run(
         f"{host.name}/{instance}",
         on_malformed=host.count_malformed,
         open_timeout_s=OPEN_TIMEOUT_S,
+        identity=identity_for(host.name, wanted.cell, connect),
     )
     sys.setswitchinterval(SWITCH_S)
     try:

@@ -3,7 +3,7 @@
 import shutil
 import signal
 import time
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
@@ -11,11 +11,14 @@ from types import FrameType
 
 import msgspec
 from rich.console import Console
+from rich.markup import escape
 
+from fras_cli.confirm import Confirmation
 from fras_cli.display import LiveDisplay, print_summary
 from fras_cli.report import Summary, write_report
 from fras_cli.stack import USUAL, Layout, UsedStack, use_stack
-from fras_cli.trial import StackDied, TrialFollower
+from fras_cli.trial import StackDied, TrialFollower, TrialView
+from fras_cli.viewing import Page, view_beside
 from fras_common.bus import NoAnswer
 from fras_common.errors import FrasError
 from fras_common.scenario import Scenario, to_toml
@@ -23,6 +26,7 @@ from fras_common.scenario import Scenario, to_toml
 EXIT_OK, EXIT_NOT_SUCCESS, EXIT_BAD_INPUT, EXIT_STACK, EXIT_INTERRUPTED = 0, 1, 2, 3, 130
 LOG = "audit.mcap"
 ABORT_REASON = "interrupted at the terminal"
+SUPERVISOR_STYLES = {"info": "dim", "warning": "yellow", "error": "bold red"}
 
 
 STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -41,6 +45,13 @@ class Interrupts:
     def __call__(self, number: int, frame: FrameType | None) -> None:
         """Count one more signal."""
         self.count += 1
+
+
+def supervisor_lines(console: Console) -> Callable[[str, str], None]:
+    """Print what a supervisor has to say, as loud as it is grave."""
+    return lambda level, text: console.print(
+        escape(f"supervisor: {text}"), style=SUPERVISOR_STYLES[level], soft_wrap=True
+    )
 
 
 @contextmanager
@@ -98,6 +109,8 @@ def run_trials(
     as_json: bool,
     mesh: bytes = b"",
     layout: Layout = USUAL,
+    asks: bool = False,
+    page: Page | None = None,
 ) -> int:
     """Run the scenarios one after the other through one stack.
 
@@ -117,6 +130,10 @@ def run_trials(
         Content of the mesh file that the scenarios name.
     layout : Layout
         What an own stack consists of.
+    asks : bool
+        Ask in the terminal about each plan that waits for approval.
+    page : Page, optional
+        The surgeon's page to open beside.
 
     Returns
     -------
@@ -137,14 +154,17 @@ def run_trials(
             cancelled=lambda: interrupts.count > 0,
             tell=lambda words: console.print(words, style="dim"),
             layout=layout,
+            report=supervisor_lines(console),
         ) as stack,
+        view_beside(cell, stack.link.connect, page),
     ):
         follower = TrialFollower(stack)
         for scenario, folder in zip(scenarios, folders, strict=True):
             if not stack.own:
                 scenario = without_hold_timeout(scenario)
             under_way.append(folder)
-            _one_trial(follower, scenario, mesh, folder, console, interrupts)
+            confirmation = Confirmation(console, follower.decide) if asks else None
+            _one_trial(follower, scenario, mesh, folder, console, interrupts, confirmation)
             summary = _report(under_way.pop(), console)
             outcomes.append(summary.outcome)
             if as_json:
@@ -179,6 +199,7 @@ def _one_trial(
     folder: Path,
     console: Console,
     interrupts: Interrupts,
+    confirmation: Confirmation | None = None,
 ) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "scenario.toml").write_text(to_toml(scenario), encoding="utf-8")
@@ -188,7 +209,13 @@ def _one_trial(
     console.print(f"trial {trial}: scenario {scenario.name}, seed {scenario.seed}")
     follower.start(trial, scenario, folder, mesh)
     with LiveDisplay(console) as display:
-        if not follower.follow(display.show, stop=lambda: interrupts.count > 0):
+
+        def look(view: TrialView) -> None:
+            if confirmation is not None and confirmation.look(view, display.pause):
+                return
+            display.show(view)
+
+        if not follower.follow(look, stop=lambda: interrupts.count > 0):
             seen = interrupts.count
             try:
                 follower.abort(ABORT_REASON)

@@ -5,6 +5,7 @@
 
 import os
 import re
+import stat
 import tempfile
 from collections.abc import Generator
 from contextlib import contextmanager
@@ -31,6 +32,10 @@ class StackExists(FrasError):
     """A stack runs in the cell already."""
 
 
+class BadRuntimeFolder(FrasError):
+    """The folder of the records is not this user's alone. Attributes: ``path``."""
+
+
 class BadCell(FrasError):
     """A cell's name that can't be part of a key or of a file's name."""
 
@@ -42,6 +47,8 @@ class StackRecord(msgspec.Struct, frozen=True, kw_only=True):
     ----------
     pid, created_s : int, float
         Process that keeps it; a reused process id has another creation time.
+    keys : str
+        Folder of its certificates; empty if it has none.
     """
 
     cell: str
@@ -49,13 +56,27 @@ class StackRecord(msgspec.Struct, frozen=True, kw_only=True):
     created_s: float
     connect: str
     log_dir: str
+    keys: str = ""
 
 
 def runtime_dir() -> Path:
-    """Private folder for the records: `$XDG_RUNTIME_DIR/fras`, else one below the temp folder."""
+    """Private folder for the records: `$XDG_RUNTIME_DIR/fras`, else one below the temp folder.
+
+    Raises
+    ------
+    BadRuntimeFolder
+        It is not this user's alone.
+    """
     base = os.environ.get("XDG_RUNTIME_DIR")
     folder = Path(base) / "fras" if base else Path(tempfile.gettempdir()) / f"fras-{os.getuid()}"
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    told = folder.lstat()
+    if not stat.S_ISDIR(told.st_mode) or told.st_uid != os.getuid() or told.st_mode & 0o022:
+        raise BadRuntimeFolder(
+            f"{folder}: somebody else may write here, and could send a stop elsewhere: remove it, "
+            "or set XDG_RUNTIME_DIR to a folder of your own",
+            path=folder,
+        )
     return folder
 
 
@@ -93,6 +114,11 @@ def all_of(cell: str) -> list[StackRecord]:
     """Find the records of all running stacks of a cell, that of `fras up` first."""
     paths = [record_path(cell), *sorted(runtime_dir().glob(f"{cell}.*.json"))]
     return [record for path in paths if (record := _read(path)) is not None]
+
+
+def everywhere() -> list[StackRecord]:
+    """Find the records of all running stacks of this machine."""
+    return [record for path in sorted(runtime_dir().glob("*.json")) if (record := _read(path))]
 
 
 def _read(path: Path) -> StackRecord | None:
@@ -137,11 +163,33 @@ def require_any(cell: str) -> list[StackRecord]:
     return records
 
 
+def require_one(cell: str, connect: str | None = None) -> StackRecord:
+    """Find the record of the one stack of a cell, or of that at `connect`.
+
+    Raises
+    ------
+    NoStack
+        There is none.
+    SeveralStacks
+        There are several.
+    """
+    records = [one for one in require_any(cell) if connect in (None, one.connect)]
+    if not records:
+        raise NoStack(f"no stack of cell {cell!r} at {connect} was started on this machine")
+    if len(records) > 1:
+        places = ", ".join(record.connect for record in records)
+        raise SeveralStacks(
+            f"{len(records)} stacks run in cell {cell!r}: say which with --connect: {places}",
+            places=places,
+        )
+    return records[0]
+
+
 def _none(cell: str) -> NoStack:
     return NoStack(f"no stack runs in cell {cell!r}: start one with `fras up --cell {cell}`")
 
 
-def keep(cell: str, connect: str, log_dir: Path) -> StackRecord:
+def keep(cell: str, connect: str, log_dir: Path, keys: Path | None = None) -> StackRecord:
     """Record that this process keeps a stack.
 
     Raises
@@ -156,7 +204,7 @@ def keep(cell: str, connect: str, log_dir: Path) -> StackRecord:
             f"stop it with `fras down --cell {cell}` or choose another --cell",
             pid=other.pid,
         )
-    record = _of_this_process(cell, connect, log_dir)
+    record = _of_this_process(cell, connect, log_dir, keys)
     path = record_path(cell)
     temporary = path.with_suffix(f".{record.pid}")
     temporary.write_bytes(msgspec.json.encode(record))
@@ -170,21 +218,22 @@ def keep(cell: str, connect: str, log_dir: Path) -> StackRecord:
     return record
 
 
-def _of_this_process(cell: str, connect: str, log_dir: Path) -> StackRecord:
+def _of_this_process(cell: str, connect: str, log_dir: Path, keys: Path | None) -> StackRecord:
     me = psutil.Process()
     return StackRecord(
         cell=cell,
         pid=me.pid,
         created_s=me.create_time(),
         connect=connect,
-        log_dir=str(log_dir),
+        log_dir=str(log_dir.resolve()),
+        keys=str(keys.resolve()) if keys is not None else "",
     )
 
 
 @contextmanager
-def noted(cell: str, connect: str, log_dir: Path) -> Generator[None]:
+def noted(cell: str, connect: str, log_dir: Path, keys: Path | None = None) -> Generator[None]:
     """Record, within the block, that this process runs a stack for itself."""
-    record = _of_this_process(cell, connect, log_dir)
+    record = _of_this_process(cell, connect, log_dir, keys)
     path = record_path(cell).with_suffix(f".{record.pid}.json")
     path.write_bytes(msgspec.json.encode(record))
     try:

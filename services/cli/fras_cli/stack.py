@@ -1,16 +1,35 @@
 """Which stack a command talks to: one that runs already, or one of its own."""
 
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Collection, Generator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from types import MappingProxyType
 
 from fras_cli import runtime
-from fras_cli.link import Link
+from fras_cli.link import NAME, Link, identity_for
+from fras_cli.own_keys import ready_keys, require_keys
 from fras_common.errors import FrasError
-from fras_supervisor import Endpoint, Exit, Stack, Table, find_table, free_port, load_table
+from fras_common.identity import default_keys_dir
+from fras_common.messages import SupervisorStatus
+from fras_common.topics import SUPERVISOR_STATUS
+from fras_supervisor import (
+    Endpoint,
+    Stack,
+    Supervision,
+    Table,
+    UnknownHost,
+    find_table,
+    free_port,
+    load_table,
+    place,
+)
+from fras_supervisor.hosts import placeholder
 from fras_supervisor.logs import Echo
+from fras_supervisor.service import Tell
+from fras_supervisor.supervision import NAME as SUPERVISOR
+from fras_supervisor.table import PLACEHOLDERS
 
 COMPLETE_TIMEOUT_S = 5.0
 ABSENCE_S = 3.0
@@ -31,10 +50,19 @@ class Layout:
         Process table: `compose/<name>.toml`, or a file.
     asp_dir : Path or None
         Rules for the planner other than those that came with FRAS.
+    keys : Path or None
+        Folder of the certificates by which its processes know each other; None: by none.
+    host : str
+        Which host of the table this machine is; empty: all of it runs here.
+    addresses : mapping of str to str
+        Where the routers of hosts are.
     """
 
     compose: str = "local"
     asp_dir: Path | None = None
+    keys: Path | None = None
+    host: str = ""
+    addresses: Mapping[str, str] = field(default_factory=dict[str, str])
 
     def table(self) -> Table:
         """Read the process table.
@@ -44,18 +72,97 @@ class Layout:
         TableError
         """
         path = Path(self.compose)
-        table = load_table(path if path.suffix == ".toml" else find_table(self.compose))
-        if self.asp_dir is not None:
-            table = table.with_arguments("planner", "--asp-dir", str(self.asp_dir.resolve()))
+        path = path if path.suffix == ".toml" else find_table(self._shipped())
+        table = load_table(path, (*PLACEHOLDERS, "keys"))
+        if self.keys is not None:
+            require_keys(table)
         return table
+
+    def placed(self, port: int) -> tuple[Table, dict[str, str]]:
+        """Take out what runs on this host; give what to fill in for the routers' endpoints, too.
+
+        Raises
+        ------
+        TableError
+        UnknownHost, NothingOnHost, NoAddress, BadAddress
+            See `fras_supervisor.place`.
+        OtherRules
+            The rules are for a planner that is not here.
+        """
+        table, routers = self.table(), {}
+        if self.host or self.addresses:
+            table, routers = place(table, self.host, port, self.addresses, self.protocol)
+        if self.asp_dir is None:
+            return table, routers
+        if "planner" not in table.processes:
+            raise OtherRules(
+                f"there is no planner on host {self.host or 'of this table'}: leave out "
+                f"--asp-dir {self.asp_dir}, or give it where the planner is",
+                cell="",
+            )
+        rules = str(self.asp_dir.resolve())
+        return table.with_arguments("planner", "--asp-dir", rules), routers
+
+    def certificates_of(self, host: str) -> list[str]:
+        """List whose certificates a host of the table needs.
+
+        Raises
+        ------
+        TableError, UnknownHost
+        """
+        table = self.table()
+        if host not in table.hosts:
+            raise UnknownHost(table.source, host, tuple(table.hosts))
+        return [*(one.name for one in table.processes.values() if one.host == host), SUPERVISOR]
+
+    def own_addresses(self, routers: Mapping[str, str]) -> list[str]:
+        """List where others reach a router of this host; empty if none asks for it."""
+        mine = routers.get(placeholder(self.host), "") if self.host else ""
+        return [Endpoint.parse(mine).host] if mine else []
+
+    def _shipped(self) -> str:
+        if self.keys is None:
+            return self.compose
+        return "secure" if self.compose == "local" else f"secure-{self.compose}"
+
+    @property
+    def protocol(self) -> str:
+        """Of its router's endpoint."""
+        return "tcp" if self.keys is None else "tls"
+
+    @property
+    def values(self) -> dict[str, str]:
+        """What its table may ask for in braces, besides what the supervisor knows."""
+        return {} if self.keys is None else {"keys": str(self.keys.resolve())}
 
     def in_words(self) -> str:
         """Options that ask for it; empty for the usual one."""
         asked = [] if self.compose == "local" else [f"--compose {self.compose}"]
+        asked += ["--secure"] if self.keys is not None else []
+        asked += [f"--host {self.host}"] if self.host else []
         return " ".join([*asked, *([f"--asp-dir {self.asp_dir}"] if self.asp_dir else [])])
 
 
 USUAL = Layout()
+
+
+def layout_of(
+    compose: str,
+    asp_dir: Path | None,
+    *,
+    secure: bool,
+    host: str = "",
+    addresses: Mapping[str, str] = MappingProxyType({}),
+) -> Layout:
+    """Make a layout of what the command line asks for.
+
+    Raises
+    ------
+    BadIdentity
+        Nobody knows where this user's keys are.
+    """
+    keys = default_keys_dir() if secure else None
+    return Layout(compose, asp_dir, keys, host, addresses)
 
 
 class StackIncomplete(FrasError):
@@ -77,6 +184,8 @@ class UsedStack:
         Whether this command started it.
     watch : callable
         What of the stack has gone, in words; empty while all is there.
+    elsewhere : mapping of str to str
+        Processes that other hosts run, and which.
     """
 
     link: Link
@@ -84,19 +193,14 @@ class UsedStack:
     log_dir: Path | None
     own: bool
     watch: Callable[[], str]
-
-
-def in_words(ended: tuple[Exit, ...]) -> str:
-    """Tell which processes have ended, and with what last words."""
-    return "; ".join(
-        f"{one.name} ended with status {one.returncode}"
-        + (f": {one.last_lines[-1]}" if one.last_lines else "")
-        for one in ended
-    )
+    elsewhere: Mapping[str, str] = field(default_factory=dict[str, str])
 
 
 class Absence:
-    """Watches a stack that others keep: a service that stays away has gone.
+    """Watches a stack that others keep: who has gone for good, or stays away.
+
+    A supervisor says who is not started again; where none speaks, a service that is away for long
+    has gone.
 
     Parameters
     ----------
@@ -106,17 +210,42 @@ class Absence:
     def __init__(self, link: Link) -> None:
         self._link = link
         self._since_s: float | None = None
+        self._heard: dict[str, tuple[SupervisorStatus, float]] = {}
+        link.bus.subscribe(SUPERVISOR_STATUS, self._on_status)
 
     def look(self) -> str:
-        """Name the services that have been away for too long; empty while all are there."""
+        """Name those that have gone; empty while all are there or may come back."""
+        now_s = time.monotonic()
+        heard = [one for one, at_s in self._heard.values() if now_s - at_s < ABSENCE_S]
+        if heard:
+            self._since_s = None
+            return "; ".join(gone for one in heard if (gone := gone_for_good(one)))
         missing = self._link.missing()
         if not missing:
             self._since_s = None
             return ""
-        now_s = time.monotonic()
         self._since_s = self._since_s or now_s
         gone = now_s - self._since_s >= ABSENCE_S
         return f"{', '.join(missing)} of cell {self._link.cell} have gone" if gone else ""
+
+    def _on_status(self, status: SupervisorStatus) -> None:
+        # On each host there may be one.
+        self._heard[status.host] = (status, time.monotonic())
+
+
+def gone_for_good(status: SupervisorStatus) -> str:
+    """Tell which processes are not started again, in words; empty if all are there or may be."""
+    return "; ".join(
+        f"{one.name} was given up, it ended {one.last_exit}"
+        if one.state == "given_up"
+        else f"{one.name} ended {one.last_exit}"
+        for one in status.processes
+        if one.state in ("given_up", "ended")
+    )
+
+
+def _not_told(level: str, text: str) -> None:
+    """Leave what the supervisor has to say to its log."""
 
 
 @contextmanager
@@ -128,8 +257,9 @@ def own_stack(
     echo: Echo | None = None,
     tell: Callable[[str], None] | None = None,
     layout: Layout = USUAL,
+    report: Tell = _not_told,
 ) -> Generator[UsedStack]:
-    """Start a stack, and stop it whatever happens.
+    """Start a stack, keep it, and stop it whatever happens.
 
     Parameters
     ----------
@@ -145,23 +275,49 @@ def own_stack(
         Gets who is waited for, in words, when the start takes long.
     layout : Layout
         What it consists of.
+    report : callable, optional
+        Gets what the supervisor has to say, and how grave it is.
 
     Raises
     ------
     TableError
         The process table is not to be used.
+    BadKeys
+        The certificates are not.
     """
-    table = layout.table()
+    endpoint = connect or f"{layout.protocol}/127.0.0.1:{free_port()}"
+    table, routers = layout.placed(Endpoint.parse(endpoint).port)
+    # Of several hosts one has the people's certificate, and each has its supervisor's.
+    name = SUPERVISOR if layout.host else NAME
+    if layout.keys is not None:
+        shown = [*table.processes, name, SUPERVISOR]
+        ready_keys(layout.keys, shown, layout.own_addresses(routers), table.elsewhere, tell)
     started_ns = time.time_ns()
-    endpoint = connect or f"tcp/127.0.0.1:{free_port()}"
-    with Link(cell, endpoint) as link:
-        watched = told_when_slow(link, cancelled, tell) if tell else cancelled
-        stack = Stack(table, cell, endpoint, log_dir, link.tokens, cancelled=watched, echo=echo)
+    with Link(cell, endpoint, keys=layout.keys, name=name) as link:
+        watched = told_when_slow(link, cancelled, tell, table.elsewhere) if tell else cancelled
+        stack = Stack(
+            table,
+            cell,
+            endpoint,
+            log_dir,
+            link.tokens,
+            values={**layout.values, **routers},
+            cancelled=watched,
+            echo=echo,
+        )
         stack.start()
         try:
-            yield UsedStack(
-                link, started_ns, log_dir, own=True, watch=lambda: in_words(stack.watch())
-            )
+            identity = identity_for(SUPERVISOR, cell, endpoint, layout.keys)
+            # It ends first: nothing is started again once the stop has begun.
+            with Supervision(stack, cell, endpoint, report, identity) as kept:
+                yield UsedStack(
+                    link,
+                    started_ns,
+                    log_dir,
+                    own=True,
+                    watch=kept.gone,
+                    elsewhere=table.elsewhere,
+                )
         finally:
             try:
                 link.close()
@@ -170,9 +326,12 @@ def own_stack(
 
 
 def told_when_slow(
-    link: Link, cancelled: Callable[[], bool], tell: Callable[[str], None]
+    link: Link,
+    cancelled: Callable[[], bool],
+    tell: Callable[[str], None],
+    elsewhere: Collection[str] = (),
 ) -> Callable[[], bool]:
-    """Return `cancelled`, which also tells, once, who is not ready after a while."""
+    """Return `cancelled`, which also tells, once, who of this host is not ready after a while."""
     told_at_s = time.monotonic() + PATIENCE_S
     told = False
 
@@ -181,8 +340,8 @@ def told_when_slow(
         if not told and link.is_open and time.monotonic() > told_at_s:
             told = True
             tell(
-                f"waiting for {', '.join(link.missing())} (the first start of sim compiles its "
-                "kernels, half a minute)"
+                f"waiting for {', '.join(one for one in link.missing() if one not in elsewhere)} "
+                "(the first start of sim compiles its kernels, half a minute)"
             )
         return cancelled()
 
@@ -216,6 +375,7 @@ def use_stack(
     cancelled: Callable[[], bool],
     tell: Callable[[str], None],
     layout: Layout = USUAL,
+    report: Tell = _not_told,
 ) -> Generator[UsedStack]:
     """Use the stack at `connect`, else the one that `fras up` keeps in `cell`, else an own one.
 
@@ -234,6 +394,8 @@ def use_stack(
         Gets which of them it is, in words.
     layout : Layout
         What an own stack consists of.
+    report : callable, optional
+        Gets what the supervisor of an own stack has to say, and how grave it is.
 
     Raises
     ------
@@ -244,7 +406,10 @@ def use_stack(
     if connect is not None:
         Endpoint.parse(connect)
     kept = runtime.find(cell) if connect is None and port is None else None
-    if layout != USUAL and (connect is not None or kept is not None):
+    there = connect or (kept.connect if kept is not None else None)
+    # A stack that is there and has certificates is what `--secure` asks for.
+    wanted = replace(layout, keys=None) if there and there.startswith("tls/") else layout
+    if wanted != USUAL and there is not None:
         raise OtherRules(
             f"the stack of cell {cell} runs already: leave out {layout.in_words()}, or start it "
             f"with `fras up {layout.in_words()}`",
@@ -260,9 +425,11 @@ def use_stack(
             yield used
     else:
         tell("starting the services")
-        endpoint = f"tcp/127.0.0.1:{port or free_port()}"
+        endpoint = f"{layout.protocol}/127.0.0.1:{port or free_port()}"
         with (
-            runtime.noted(cell, endpoint, log_dir),
-            own_stack(cell, endpoint, log_dir, cancelled, tell=tell, layout=layout) as used,
+            runtime.noted(cell, endpoint, log_dir, layout.keys),
+            own_stack(
+                cell, endpoint, log_dir, cancelled, tell=tell, layout=layout, report=report
+            ) as used,
         ):
             yield used

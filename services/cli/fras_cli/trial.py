@@ -11,9 +11,12 @@ from fras_cli.stack import UsedStack
 from fras_common.bus import NoAnswer
 from fras_common.errors import FrasError
 from fras_common.messages import (
+    ApproveRequest,
     CancelRequest,
+    DecisionReply,
     Health,
     Plan,
+    RejectRequest,
     RobotState,
     TaskReply,
     TaskRequest,
@@ -22,9 +25,11 @@ from fras_common.messages import (
 )
 from fras_common.scenario import Scenario
 from fras_common.topics import (
+    APPROVE,
     CANCEL,
     HEALTH,
     PLAN,
+    REJECT,
     ROBOT_STATE,
     TASK,
     TASK_STATUS,
@@ -124,6 +129,13 @@ class TrialFollower:
         if isinstance(answer, FrasError):
             raise answer
 
+    def decide(self, request: ApproveRequest | RejectRequest) -> DecisionReply:
+        """Have the planner take a decision on the plan that waits."""
+        bus = self._stack.link.bus
+        if isinstance(request, ApproveRequest):
+            return bus.query(APPROVE, request, START_TIMEOUT_S)
+        return bus.query(REJECT, request, START_TIMEOUT_S)
+
     def follow(self, show: Callable[[TrialView], None], stop: Callable[[], bool]) -> bool:
         """Show the view until the trial has ended and its log is closed.
 
@@ -156,7 +168,11 @@ class TrialFollower:
             self._changed.notify_all()
 
     def _on_task(self, status: TaskStatus) -> None:
-        if status.trial == self._trial:
+        last = self._view.task
+        if status.trial != self._trial:
+            return
+        # What somebody says again is over: the end of a trial would never be seen.
+        if last is None or last.source != status.source or last.seq < status.seq:
             self._update(task=status)
 
     def _on_plan(self, plan: Plan) -> None:

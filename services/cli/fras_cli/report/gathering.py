@@ -151,7 +151,7 @@ class Gathering:
     def _count_gap(self, key: str, header: HeaderFields) -> None:
         stream = (key, header.source)
         last = self._seqs.get(stream)
-        if last is not None and header.seq > last + 1:
+        if last is not None and header.seq > last + 1 and not topics.may_be_lost(key):
             self._lost += header.seq - last - 1
         self._seqs[stream] = header.seq if last is None else max(header.seq, last)
 

@@ -55,7 +55,7 @@ class PlanStory:
         From 1.
     kind : {"plan", "re-plan", "resumed", "check", "no plan"}
         `check`: the goal was found reached, nothing is left to do. `resumed`: planned anew after
-        a person's hold, which is no re-plan.
+        a person's hold or rejection, which is no re-plan.
     replan : int
         Which re-plan it is, from 1; 0 if none.
     at_s : float
@@ -120,7 +120,8 @@ def _kind(plan: Plan, number: int) -> PlanKind:
         return "check"
     if number == 1:
         return "plan"
-    return "resumed" if plan.reason == "hold" else "re-plan"
+    kind = plan.reason.partition(":")[0]
+    return "resumed" if kind in ("hold", "restart", "rejected") else "re-plan"
 
 
 def _begun(trial: Trial) -> list[_Begun]:

@@ -16,6 +16,8 @@ _REASONS = {
     "force_soft": "the force limit was crossed",
     "force_hard": "the hard force limit was crossed",
     "hold": "a person held the arms and let them go again",
+    "rejected": "a person rejected the plan before",
+    "restart": "a service had to start again",
     "nothing_in_reach": "the jaw closed on nothing",
     "replans": "the number of re-plans allowed is used up",
     "hold:solver": "the tissue simulation had no valid solution",
@@ -80,6 +82,8 @@ def reason_in_words(reason: str) -> str:
             return f"the motion service refused: {rest}"
         case "hold":
             return f"held by {rest} and not let go"
+        case "rejected":
+            return f"a person rejected the plan before: {rest}"
         case "gate":
             return f"the safety gate {rest} stopped the arm"
         case _:
@@ -94,7 +98,9 @@ def plan_title(story: PlanStory) -> str:
         case "re-plan":
             return f"Re-plan {story.replan}"
         case "resumed":
-            return "Plan after a hold"
+            kind = story.plan.reason.partition(":")[0]
+            why = {"restart": "a restart", "rejected": "a rejection"}.get(kind, "a hold")
+            return f"Plan after {why}"
         case "check":
             return "Goal check"
         case "no plan":
@@ -122,6 +128,9 @@ def changes(before: PlanStory, after: PlanStory) -> list[str]:
     old, new = before.plan, after.plan
     sentences = [
         f"{block} is no candidate any more." for block in new.tried if block not in old.tried
+    ]
+    sentences += [
+        f"{name} is excluded by a person." for name in new.rejected if name not in old.rejected
     ]
     if old.ignore_ap and not new.ignore_ap:
         sentences.append("Attachment points, ignored before, count from now on.")

@@ -3,8 +3,6 @@
 import os
 from pathlib import Path
 
-from fras_cli.report.figures import PICTURE_DPI, picture_figure, to_png
-from fras_cli.report.page import render_page
 from fras_cli.report.reading import read_trial
 from fras_cli.report.story import tell
 from fras_cli.report.summary import Summary, summarise, to_json
@@ -18,6 +16,10 @@ def write_report(log: Path, out_dir: Path) -> Summary:
     NoSuchLog, NotAnMcap, ForeignLog, ScenarioError
         Nothing is written.
     """
+    # Not at the top: every command that leads a stack comes by here, and `fras stop` has no time
+    # to load what draws.
+    from fras_cli.report.page import render_page
+
     trial = read_trial(log)
     summary = summarise(trial)
     page = render_page(trial, summary)
@@ -35,6 +37,8 @@ def write_picture(log: Path, path: Path) -> None:
     NoSuchLog, NotAnMcap, ForeignLog, ScenarioError
         Nothing is written.
     """
+    from fras_cli.report.figures import PICTURE_DPI, picture_figure, to_png
+
     trial = read_trial(log)
     figure = picture_figure(trial, tell(trial))
     path.parent.mkdir(parents=True, exist_ok=True)

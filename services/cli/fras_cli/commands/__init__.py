@@ -1,0 +1,1 @@
+"""Names, options and help of the `fras` commands; what they do stands in the modules above."""
