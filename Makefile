@@ -1,5 +1,5 @@
 # The two commands of the README are `make run` and `make test`; both install what is missing.
-.PHONY: help install run test check format bench clean
+.PHONY: help install run test test-full check format bench browser screenshots clean
 
 PYTHON ?= python3
 VENV := .venv
@@ -14,7 +14,7 @@ PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check 
 endif
 
 help: ## show this list
-	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
 
 install: $(VENV)/.installed ## install FRAS and all its services into .venv
 
@@ -38,8 +38,12 @@ $(VENV)/.installed-dev: $(VENV)/.installed
 run: $(VENV)/.installed ## run one complete autonomous retraction
 	$(BIN)/fras run
 
+# Two at a time: a tick waits for one process after the other, so that one trial leaves a core idle.
 test: $(VENV)/.installed-dev ## run all tests, those with real processes too
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile
+
+test-full: $(VENV)/.installed-dev ## the same with every random campaign in full length
+	FRAS_TESTS=full $(BIN)/python -m pytest --numprocesses 2 --dist loadfile
 
 check: $(VENV)/.installed-dev ## lint, format, types, import contracts
 	$(BIN)/ruff check .
@@ -60,7 +64,23 @@ bench: $(VENV)/.installed-dev ## measure; figures belong into docs/benchmarks.md
 	$(BIN)/fras bench awareness
 	$(BIN)/fras bench motion
 	$(BIN)/fras bench recorder
+	$(BIN)/fras bench log
 	$(BIN)/fras bench replay
+	$(BIN)/fras bench secure
+	-$(BIN)/fras bench page # needs make browser
+	$(BIN)/fras bench start
+	$(BIN)/fras bench soak --trials 200 --mesh 11,13,2
+	-$(BIN)/fras bench hosts # needs root
+
+BROWSER := chromium-headless-shell
+
+browser: ## install the browser that the tests of the surgeon's page drive (Debian, as root)
+	@command -v $(BROWSER) >/dev/null || { \
+	  echo "installing $(BROWSER)" && apt-get update -qq && DEBIAN_FRONTEND=noninteractive \
+	  apt-get install -qq --no-install-recommends $(BROWSER) fonts-dejavu-core >/dev/null; }
+
+screenshots: $(VENV)/.installed-dev browser ## take the pictures of docs/tour.md anew
+	$(BIN)/python -m benchmarks.page_pictures
 
 clean: ## remove what was built; runs/ stays
 	rm -rf $(VENV) build dist .pytest_cache .ruff_cache .import_linter_cache .hypothesis
