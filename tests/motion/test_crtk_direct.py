@@ -11,7 +11,15 @@ from fras_motion.crtk import CommandRefused, DirectControl
 from fras_motion.crtk.direct import DIRECT_GATES
 from fras_motion.crtk.line import path_length, slerp
 from fras_motion.drivers import Setpoint
-from fras_motion.kinematics import BASES_IN_WORLD, HOME_TIPS_M, ArmKinematics, Pose, Quaternion
+from fras_motion.kinematics import (
+    BASES_IN_WORLD,
+    HOME_TIPS_M,
+    JOINTS,
+    ArmKinematics,
+    Joints,
+    Pose,
+    Quaternion,
+)
 from fras_motion.parameters import MotionParameters
 from fras_motion.robots import home_setpoints, simulated_drivers
 from fras_motion.safety import Bounds, GateRefused, Step
@@ -80,6 +88,29 @@ def test_the_last_servo_of_a_tick_counts_and_is_measured_from_where_the_arm_is(
         arms.servo_cp("psm1", Pose((x + step, y, z), DOWN))
     arms.tick(held=False)
     assert tip(arms).position_m[0] == pytest.approx(x + 0.0005, abs=1e-9)
+
+
+def turned(step: int) -> Joints:
+    """The pitch after some ticks at nearly its full speed."""
+    a, b, c, d, e, f = HOME["psm1"].joints
+    return (a, b + 0.99 * JOINTS[1].speed * DT_S * step, c, d, e, f)
+
+
+def test_two_setpoints_of_a_tick_bring_the_way_of_both_where_one_may_be_late() -> None:
+    quick = replace(PARAMETERS, free_speed_m_s=0.2, stop_deceleration_m_s2=10.0)
+    drivers = simulated_drivers(quick, KINEMATICS)
+    for late_s in (0.0, DT_S):
+        arms = DirectControl(quick, KINEMATICS, drivers, HOME, late_s=late_s)
+        arms.servo_jp("psm1", turned(1))
+        arms.tick(held=False)
+        arms.servo_jp("psm1", turned(2))
+        if late_s:
+            arms.servo_jp("psm1", turned(3))
+            assert refusal(arms.servo_jp, "psm1", turned(4)).reason == "joint_speed"
+        else:
+            assert refusal(arms.servo_jp, "psm1", turned(3)).reason == "joint_speed"
+        arms.tick(held=False)
+        assert joints(arms) == turned(3 if late_s else 2)
 
 
 def test_jaw_and_joints_of_one_tick_are_both_followed(arms: DirectControl) -> None:

@@ -16,8 +16,7 @@ from fras_motion.robots import home_setpoints, simulated_drivers
 
 __all__ = ["ArmsService"]
 
-# A robot's own limits, not those of a trial: whoever leads it sends setpoints at a rate of his own,
-# so one may bring the way of two of them.
+# A robot's own limits, not those of a trial.
 ROBOT = MotionParameters(
     dt_s=0.01,
     free_speed_m_s=0.2,
@@ -46,6 +45,7 @@ class ArmsService:
             kinematics,
             simulated_drivers(ROBOT, kinematics),
             home_setpoints(kinematics, HOME_TIPS_M, ROBOT),
+            late_s=ROBOT.dt_s,
         )
         self._pacer = Pacer(ROBOT.dt_s, 1.0)
         self._face = CrtkFace(host, self._direct, kinematics, self._permit, self._on_state)

@@ -56,6 +56,9 @@ class DirectControl:
         By arm.
     gates : mapping of str to Gate, optional
         What each setpoint has to pass.
+    late_s : float, optional
+        How late a setpoint may come. The next one, in time, comes with it in one tick and brings
+        the way of both.
     """
 
     def __init__(
@@ -65,8 +68,10 @@ class DirectControl:
         drivers: Mapping[str, Driver],
         home: Mapping[str, Setpoint],
         gates: Mapping[str, Gate] = DIRECT_GATES,
+        late_s: float = 0.0,
     ) -> None:
         self._parameters = parameters
+        self._late_s = late_s
         self._gates = gates
         self._bounds = parameters.bounds
         self._arms = {
@@ -227,7 +232,8 @@ class DirectControl:
 
     def _servo(self, name: str, command: str, goal: Setpoint) -> None:
         arm, dt_s = self._arms[name], self._parameters.dt_s
-        elapsed_s = min(max(1, arm.ticks_since_servo) * dt_s, max(_LONGEST_STEP_S, dt_s))
+        since_s = max(1, arm.ticks_since_servo) * dt_s + self._late_s
+        elapsed_s = min(since_s, max(_LONGEST_STEP_S, dt_s))
         with _named(name, command):
             self._check(arm, goal, elapsed_s)
         arm.wanted = goal
