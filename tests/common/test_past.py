@@ -1,5 +1,6 @@
 """What is cached is asked for piece by piece, none of them large."""
 
+from collections import Counter
 from collections.abc import Callable
 
 import pytest
@@ -80,7 +81,7 @@ def test_all_comes_and_no_piece_is_large():
     assert [sample.payload for sample in found] == expected
     assert cell.most_open == AT_ONCE
     first, *pieces = cell.answered
-    assert first[0] == "**/@adv/**?_max=1"
+    assert first[0] == "**/@adv/pub/**?_max=1"
     assert len(pieces) > 1000 * 40_000 // PIECE_BYTES
     assert all(0 < count <= PIECE_SAMPLES and size <= PIECE_BYTES for _, count, size in pieces)
 
@@ -105,3 +106,43 @@ def test_an_empty_cell_answers_at_once():
     done = asked(cell)
     cell.answer()
     assert done == [[]]
+
+
+def test_a_piece_that_is_not_answered_in_time_is_asked_for_again_behind_the_others():
+    cell = Cell()
+    done = asked(cell)
+    cell.answer()
+    selector, _, on_end, _ = cell.open.pop(0)
+    cell.now_s += TIMEOUT_S * PIECE_SHARE
+    on_end()
+    while cell.open:
+        cell.answer()
+    assert cell.answered[-1][0] == selector
+    (found,) = done
+    assert len(found) == sum(min(len(one), kept_of(key)) for (key, _), one in cell.caches.items())
+
+
+def test_who_does_not_tell_the_latest_in_time_is_asked_again():
+    cell = Cell()
+    everyone = cell.caches
+    cell.caches = {name: cache for name, cache in everyone.items() if name[0] != LARGE}
+    done = asked(cell)
+    cell.now_s += TIMEOUT_S * PIECE_SHARE
+    cell.answer()
+    cell.caches = everyone
+    while cell.open:
+        cell.answer()
+    (found,) = done
+    assert Counter(one.key for one in found) == {LARGE: kept_of(LARGE), SMALL: 703, ONE: 1}
+
+
+def test_who_has_gone_meanwhile_is_asked_twice_and_no_more():
+    cell = Cell()
+    done = asked(cell)
+    cell.answer()
+    cell.caches = {}
+    while cell.open:
+        cell.answer()
+    assert len(done) == 1
+    pieces = [selector for selector, *_ in cell.answered[1:]]
+    assert all(pieces.count(one) == 2 for one in pieces)

@@ -27,6 +27,8 @@ FROZEN_PUTS = 900
 LISTENER = """
 import sys, threading
 from fras_common.bus.zenoh_bus import ZenohBus
+from fras_common.codec import decode
+from fras_common.messages import LogRecord
 from fras_common.topics import LOG
 expected, done, seqs = int(sys.argv[3]), threading.Event(), []
 def on_log(message):
@@ -36,7 +38,10 @@ def on_log(message):
     if message.event == "last":
         done.set()
 bus = ZenohBus(sys.argv[1], sys.argv[2], "sa/frozen")
-bus.subscribe(LOG.of(service="sim"), on_log)
+if sys.argv[4] == "typed":
+    bus.subscribe(LOG.of(service="sim"), on_log)
+else:
+    bus.subscribe_raw("**", lambda one: on_log(decode(LogRecord, one.payload, one.key)))
 print("subscribed", flush=True)
 done.wait(60)
 print(seqs == list(range(seqs[0], seqs[0] + len(seqs))), seqs[-1], flush=True)
@@ -44,11 +49,13 @@ bus.close()
 """
 
 
-@pytest.fixture
-def listener(router: Any) -> Iterator[tuple[str, subprocess.Popen[str]]]:
+@pytest.fixture(params=["typed", "raw"])
+def listener(
+    router: Any, request: pytest.FixtureRequest
+) -> Iterator[tuple[str, subprocess.Popen[str]]]:
     cell = f"frozen-{uuid.uuid4().hex[:6]}"
     process = subprocess.Popen(
-        [sys.executable, "-c", LISTENER, cell, router.endpoint, str(FROZEN_PUTS)],
+        [sys.executable, "-c", LISTENER, cell, router.endpoint, str(FROZEN_PUTS), request.param],
         stdout=subprocess.PIPE,
         text=True,
     )

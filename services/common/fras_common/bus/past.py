@@ -10,19 +10,25 @@ import time
 from collections import defaultdict, deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 from fras_common.bus.contract import RawSample
 from fras_common.keeping import kept_of
 
-__all__ = ["Cached", "Get", "Past"]
+__all__ = ["CACHES", "Cached", "Get", "Past", "cache_selector", "piece_length"]
 
+CACHES: Final = "/@adv/pub/"
+"""Between the key and `<session>/<entity>` of an advanced publisher: where it answers for its
+cache, and says the latest number."""
 PIECE_BYTES: Final = 2**20
 PIECE_SAMPLES: Final = 256
 AT_ONCE: Final = 4
 """Pieces under way; each is another publisher's, or the next of the same."""
 PIECE_SHARE: Final = 0.25
 """Of the whole time: a publisher that is frozen must not use it up for all."""
+TRIES: Final = 2
+"""How often is asked what nobody answers, or somebody not in time."""
 EARLIEST_S: Final = 0.1
 """The least that a question may take; the library takes none for without end."""
 
@@ -42,6 +48,13 @@ class Cached:
     sample: RawSample
     publisher: str
     number: int
+
+
+@dataclass
+class _Piece:
+    selector: str
+    tries: int = 0
+    count: int = 0
 
 
 Get = Callable[[str, Callable[[Cached], None], Callable[[], None], float], None]
@@ -78,46 +91,65 @@ class Past:
         self._clock_s = clock_s
         self._by_s = clock_s() + timeout_s
         self._piece_s = timeout_s * PIECE_SHARE
-        self._found: dict[tuple[str, str], list[Cached]] = defaultdict(list)
-        self._pieces: deque[str] = deque()
+        self._found: dict[tuple[str, str], dict[int, Cached]] = defaultdict(dict)
+        self._pieces: deque[_Piece] = deque()
         self._under_way = 0
         self._lock = threading.Lock()
 
     def ask(self, key_expr: str) -> None:
         """Begin."""
-        # Where an advanced publisher answers for its cache.
-        self._get(f"{key_expr}/@adv/**?_max=1", self._note, self._begin, self._piece_s)
+        self._ask_first(_Piece(f"{key_expr}{CACHES}**?_max=1"))
 
-    def _note(self, one: Cached) -> None:
-        with self._lock:
-            self._found[one.sample.key, one.publisher].append(one)
+    def _ask_first(self, first: _Piece) -> None:
+        first.tries += 1
+        by_s = self._clock_s() + self._piece_s - EARLIEST_S
+        self._ask(first, partial(self._begin, first, by_s), self._piece_s)
 
-    def _begin(self) -> None:
+    def _begin(self, first: _Piece, by_s: float) -> None:
+        if self._clock_s() >= by_s and first.tries < TRIES:
+            # Somebody has not answered in time.
+            self._ask_first(first)
+            return
         with self._lock:
-            self._pieces.extend(
-                piece for found in self._found.values() for piece in pieces_before(found[-1])
-            )
-        self._go_on(ended=0)
+            latest = [max(found.items())[1] for found in self._found.values()]
+            self._pieces.extend(_Piece(one) for each in latest for one in pieces_before(each))
+        self._go_on()
 
-    def _go_on(self, ended: int = 1) -> None:
+    def _ask(self, piece: _Piece, on_end: Callable[[], None], allowed_s: float) -> None:
+        def note(one: Cached) -> None:
+            with self._lock:
+                piece.count += 1
+                self._found[one.sample.key, one.publisher][one.number] = one
+
+        self._get(piece.selector, note, on_end, allowed_s)
+
+    def _end(self, piece: _Piece) -> None:
         with self._lock:
-            self._under_way -= ended
+            self._under_way -= 1
+            if piece.count == 0 and piece.tries < TRIES:
+                # A publisher that was too busy to answer in time may do so now.
+                self._pieces.append(piece)
+        self._go_on()
+
+    def _go_on(self) -> None:
+        with self._lock:
             if self._left_s() <= 0.0:
                 self._pieces.clear()
-            following: list[str] = []
+            following: list[_Piece] = []
             while self._pieces and self._under_way < AT_ONCE:
                 following.append(self._pieces.popleft())
                 self._under_way += 1
             is_done = self._under_way == 0
-        for selector in following:
+        for piece in following:
+            piece.tries += 1
             allowed_s = min(self._piece_s, max(self._left_s(), EARLIEST_S))
-            self._get(selector, self._note, self._go_on, allowed_s)
+            self._ask(piece, partial(self._end, piece), allowed_s)
         if is_done:
             self._finish()
 
     def _finish(self) -> None:
-        found = [sorted(one, key=lambda cached: cached.number) for one in self._found.values()]
-        self._on_done([cached.sample for one in found for cached in one])
+        found = [sorted(one.items()) for one in self._found.values()]
+        self._on_done([cached.sample for one in found for _, cached in one])
 
     def _left_s(self) -> float:
         return self._by_s - self._clock_s()
@@ -126,8 +158,16 @@ class Past:
 def pieces_before(latest: Cached) -> Iterator[str]:
     """Tell the selectors of what a publisher may have cached before its latest sample."""
     key, end = latest.sample.key, latest.number
-    fitting = PIECE_BYTES // max(1, len(latest.sample.payload))
-    step = min(max(1, fitting), PIECE_SAMPLES)
+    step = piece_length(len(latest.sample.payload))
     for first in range(max(0, end + 1 - kept_of(key)), end, step):
-        last = min(first + step, end) - 1
-        yield f"{key}/@adv/pub/{latest.publisher}/**?_sn={first}..{last}"
+        yield cache_selector(key, latest.publisher, first, min(first + step, end) - 1)
+
+
+def piece_length(payload_bytes: int) -> int:
+    """Tell how many samples of a length make a piece."""
+    return min(max(1, PIECE_BYTES // max(1, payload_bytes)), PIECE_SAMPLES)
+
+
+def cache_selector(key: str, publisher: str, first: int, last: int) -> str:
+    """Tell where an advanced publisher answers for these numbers of its samples."""
+    return f"{key}{CACHES}{publisher}/**?_sn={first}..{last}"

@@ -25,7 +25,8 @@ from fras_common.bus.contract import (
     RawSample,
     RemoteFault,
 )
-from fras_common.bus.past import Cached, Past
+from fras_common.bus.hearing import Hearing
+from fras_common.bus.past import CACHES, Cached, Past
 from fras_common.bus.settings import NoRouter, Settings, client_settings, router_settings
 from fras_common.bus.shared import Answer, Stamper, received, wait_for
 from fras_common.codec import MalformedMessage, decode, encode
@@ -40,6 +41,8 @@ Req = TypeVar("Req")
 Rep = TypeVar("Rep")
 
 HEARTBEAT_S = 0.1
+# A publisher's latest number, as four bytes.
+BEAT_BYTES = 4
 ENCODING = zenoh.Encoding("application/msgpack")
 TOKENS = ("alive/**", "ready/**")
 # What was said before gives way to what is said now, health above all.
@@ -170,9 +173,26 @@ class ZenohBus:
 
     def subscribe_raw(self, key_expr: str, callback: Callable[[RawSample], None]) -> None:
         """Receive samples undecoded, from now on."""
-        # No history: the library drops what comes of it behind a live sample of the publisher, and
-        # with many publishers the first live one, too (measured). `cached` asks for all of it.
-        self._subscribe(key_expr, lambda one: callback(_raw(one)), history=None, recover=True)
+        self.require_open()
+        hearing = Hearing(self._get_cached, callback)
+
+        def note(sample: zenoh.Sample) -> None:
+            if (numbered := _numbered(sample)) is not None:
+                hearing.note(numbered)
+            else:
+                hearing.pass_on(_raw(sample))
+
+        def note_latest(beat: zenoh.Sample) -> None:
+            payload = beat.payload.to_bytes()
+            key, _, name = str(beat.key_expr).partition(CACHES)
+            # Anybody may say something else there; it tells nothing.
+            if len(payload) == BEAT_BYTES:
+                publisher = "/".join(name.split("/")[:2])
+                hearing.note_latest(key, publisher, int.from_bytes(payload, "little"))
+
+        self._declared.append(hearing)
+        for key, tell in ((key_expr, note), (f"{key_expr}{CACHES}**", note_latest)):
+            self._declared.append(self._session.declare_subscriber(key, tell))
 
     def _subscribe(
         self,
@@ -208,9 +228,8 @@ class ZenohBus:
         timeout_s: float,
     ) -> None:
         def on_reply(reply: zenoh.Reply) -> None:
-            if reply.ok is not None and (info := reply.ok.source_info) is not None:
-                publisher = f"{info.source_id.zid}/{info.source_id.eid}"
-                note(Cached(_raw(reply.ok), publisher, info.source_sn))
+            if reply.ok is not None and (numbered := _numbered(reply.ok)) is not None:
+                note(numbered)
 
         try:
             self._session.get(
@@ -378,6 +397,12 @@ class _ZenohCall:
 
 def _raw(sample: zenoh.Sample) -> RawSample:
     return RawSample(str(sample.key_expr), sample.payload.to_bytes(), str(sample.encoding))
+
+
+def _numbered(sample: zenoh.Sample) -> Cached | None:
+    if (info := sample.source_info) is None:
+        return None
+    return Cached(_raw(sample), f"{info.source_id.zid}/{info.source_id.eid}", info.source_sn)
 
 
 def _outcome(query: Query[Any, Rep], reply: zenoh.Reply, timeout_s: float) -> Rep | FrasError:

@@ -1,0 +1,109 @@
+"""Who listens to everything, without losses: asks caches for what did not arrive."""
+
+import threading
+import time
+from collections.abc import Callable
+
+from fras_common.bus.contract import RawSample
+from fras_common.bus.past import Cached, Get
+from fras_common.bus.recovery import Ask, Recovery
+
+__all__ = ["Hearing"]
+
+ANSWER_S = 10.0
+"""A publisher that is busy answers late."""
+
+
+class Hearing:
+    """Tells samples on, and asks on a thread of its own for what is missing.
+
+    Parameters
+    ----------
+    get : callable
+        Asks a cache; may call back on any thread.
+    callback : callable
+        Gets the samples, one at a time, on any thread.
+    """
+
+    def __init__(self, get: Get, callback: Callable[[RawSample], None]) -> None:
+        self._get = get
+        self._callback = callback
+        self._recovery = Recovery(time.monotonic)
+        self._is_closed = False
+        self._is_telling = False
+        self._due_s: float | None = None
+        self._changed = threading.Condition()
+        self._thread = threading.Thread(target=self._run, name="recovery", daemon=True)
+        self._thread.start()
+
+    def note(self, heard: Cached) -> None:
+        """Take in what a publisher has just said."""
+        with self._changed:
+            self._recovery.note(heard)
+            self._look()
+        self._tell()
+
+    def pass_on(self, sample: RawSample) -> None:
+        """Tell on what bears no number."""
+        with self._changed:
+            self._recovery.told.append(sample)
+        self._tell()
+
+    def note_latest(self, key: str, publisher: str, number: int) -> None:
+        """Take in which number was a publisher's latest."""
+        with self._changed:
+            self._recovery.note_latest(key, publisher, number)
+            self._look()
+
+    def undeclare(self) -> None:
+        """Ask no more."""
+        with self._changed:
+            self._is_closed = True
+            self._changed.notify()
+        self._thread.join()
+
+    def _look(self) -> None:
+        due_s = self._recovery.due_s()
+        if due_s != self._due_s:
+            self._due_s = due_s
+            self._changed.notify()
+
+    def _tell(self) -> None:
+        """Tell on what can be told, unless somebody is about it: the order is to stay.
+
+        Without the lock, since who is told may himself say something that is heard here.
+        """
+        while True:
+            with self._changed:
+                if self._is_telling or not self._recovery.told:
+                    return
+                self._is_telling = True
+                sample = self._recovery.told.popleft()
+            try:
+                self._callback(sample)
+            finally:
+                with self._changed:
+                    self._is_telling = False
+
+    def _run(self) -> None:
+        while (asks := self._next()) is not None:
+            for ask in asks:
+                self._get(ask.selector, ask.found.append, lambda ask=ask: self._end(ask), ANSWER_S)
+
+    def _next(self) -> list[Ask] | None:
+        """Wait until something has to be asked for; None at the end."""
+        with self._changed:
+            while not self._is_closed:
+                if asks := self._recovery.questions():
+                    self._look()
+                    return asks
+                self._due_s = self._recovery.due_s()
+                wait_s = None if self._due_s is None else max(0.0, self._due_s - time.monotonic())
+                self._changed.wait(wait_s)
+        return None
+
+    def _end(self, ask: Ask) -> None:
+        with self._changed:
+            self._recovery.answered(ask)
+            self._look()
+        self._tell()
