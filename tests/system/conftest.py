@@ -56,10 +56,10 @@ class Trials:
         self._count = 0
         self._kept: dict[Any, tuple[Summary, Path]] = {}
 
-    def start(self, scenario: Scenario, mesh: bytes = b"") -> Path:
+    def start(self, scenario: Scenario, mesh: bytes = b"", into: Path | None = None) -> Path:
         """Begin a trial; returns its folder."""
         self._count += 1
-        folder = self._folder / f"trial-{self._count}"
+        folder = (into or self._folder) / f"trial-{self._count}"
         self.follower.start(f"trial-{self._count}", scenario, folder, mesh)
         return folder
 

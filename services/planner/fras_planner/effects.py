@@ -35,6 +35,14 @@ class AwaitDecision:
 
 
 @dataclass(frozen=True)
+class Pause:
+    """Go on after a while; `waiting_for` tells whom it is for."""
+
+    seconds_s: float
+    waiting_for: str
+
+
+@dataclass(frozen=True)
 class Say:
     """Publish; sends back the message as it was stamped."""
 
@@ -46,4 +54,4 @@ class Accept:
     """The trial has begun and its log is open: answer whoever started it."""
 
 
-Effect = Ask | AwaitResult | AwaitDecision | Say | Accept
+Effect = Ask | AwaitResult | AwaitDecision | Pause | Say | Accept

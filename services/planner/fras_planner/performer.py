@@ -8,7 +8,7 @@ from fras_common.bus import NoAnswer, Publisher
 from fras_common.errors import FrasError
 from fras_common.messages import ActionResult, Plan, TaskStatus
 from fras_common.service import ServiceHost
-from fras_planner.effects import Accept, Ask, AwaitDecision, AwaitResult, Effect, Say
+from fras_planner.effects import Accept, Ask, AwaitDecision, AwaitResult, Effect, Pause, Say
 
 Steps = Generator[Effect, Any, Any]
 
@@ -68,6 +68,8 @@ class Performer:
         self._clock = clock
         self._patience_s = 0.0
         self._unanswered: _Unanswered | None = None
+        self._pause: Pause | None = None
+        self._pause_by_s = 0.0
         self._steps: Steps | None = None
         self._turn = 0
         self._results: dict[str, ActionResult] = {}
@@ -95,13 +97,21 @@ class Performer:
     @property
     def missing(self) -> str:
         """The service that is away though it was asked; empty if none is."""
+        if self._pause is not None:
+            return self._pause.waiting_for
         away = self._unanswered
         if away is None or self._clock() - away.since_s < TOLD_AFTER_S:
             return ""
         return away.ask.query.server
 
     def wake(self) -> float | None:
-        """Ask again what is due; return the seconds until the next time, or None."""
+        """Ask again what is due, go on after a pause; return the seconds until then, or None."""
+        if self._pause is not None:
+            left_s = self._pause_by_s - self._clock()
+            if left_s <= 0.0:
+                self.drive(None)
+                return None
+            return left_s
         away = self._unanswered
         if away is None:
             return None
@@ -127,6 +137,7 @@ class Performer:
             self._turn += 1
             self.awaited = ""
             self._unanswered = None
+            self._pause = None
             try:
                 if isinstance(outcome, FrasError):
                     effect = self._steps.throw(outcome)
@@ -149,6 +160,9 @@ class Performer:
                         return
                     outcome = self._take_result()
                 case AwaitDecision():
+                    return
+                case Pause(seconds_s):
+                    self._pause, self._pause_by_s = effect, self._clock() + seconds_s
                     return
                 case Ask():
                     self._ask(effect)

@@ -46,6 +46,10 @@ class NothingToClose(FrasError):
     """No log is open for the trial named."""
 
 
+class LogFailed(FrasError):
+    """The log that was to be closed can't be written."""
+
+
 class RecorderService:
     """Writes what it hears; between trials it only listens.
 
@@ -304,7 +308,7 @@ class RecorderService:
         self._request = None
         pending, self._closing = self._closing, None
         if pending is not None:
-            pending.fail(FrasError(f"log cannot be written: {error}"))
+            pending.fail(LogFailed(f"log cannot be written: {error}"))
 
     def _publish(self, state: LogState, reason: str = "", facts: Facts | None = None) -> None:
         self._facts = facts or self._facts
