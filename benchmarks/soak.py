@@ -1,4 +1,4 @@
-"""Trials without end: `python -m benchmarks.soak [--trials N] [--json FILE] [--figure FILE]`.
+"""Trials without end: `fras bench soak [--trials N] [--page] [--json FILE] [--figure FILE]`.
 
 One stack, one trial after another as fast as possible; after each, what every process uses: memory
 of its own (USS), descriptors, threads, open files, and what its health counts. Flat is what rises
@@ -16,7 +16,8 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import asdict
 from itertools import pairwise
 from pathlib import Path
@@ -29,6 +30,7 @@ from benchmarks.soak_verdict import BOUNDS, Judged, judge
 from rich.console import Console
 from rich.table import Table
 
+from fras_cli.link import Link
 from fras_cli.options import build_scenario
 from fras_cli.stack import own_stack
 from fras_cli.trial import TrialFollower, TrialView
@@ -40,13 +42,32 @@ COUNTED: Final = ("gaps", "dropped", "malformed", "refused")
 Sample = dict[str, dict[str, float]]
 
 
-def soak(trials: int, mesh: str | None, console: Console) -> tuple[list[dict[str, Any]], float]:
+@contextmanager
+def looked_at(link: Link, wanted: bool) -> Generator[dict[str, int]]:
+    """Have a surgeon's page open, whose client draws nothing; yields its process by name."""
+    if not wanted:
+        yield {}
+        return
+    # Not at the top: the rest needs no browser's library.
+    from benchmarks.page_jobs import watched
+    from benchmarks.surgeon import served
+
+    with served(link) as page, watched(page.address):
+        yield {"monitor": page.process.pid}
+
+
+def soak(
+    trials: int, mesh: str | None, console: Console, *, page: bool
+) -> tuple[list[dict[str, Any]], float]:
     """Run the trials; what was seen after each, and how long the stack took to be ready [s]."""
     rows: list[dict[str, Any]] = []
     began_s = time.monotonic()
-    with tempfile.TemporaryDirectory() as name, own_stack("soak", None, Path(name)) as stack:
+    with ExitStack() as inside:
+        name = inside.enter_context(tempfile.TemporaryDirectory())
+        stack = inside.enter_context(own_stack("soak", None, Path(name)))
         ready_s = time.monotonic() - began_s
-        follower, watch = TrialFollower(stack), Watch(stack.link.bus)
+        others = inside.enter_context(looked_at(stack.link, page))
+        follower, watch = TrialFollower(stack), Watch(stack.link.bus, others)
         console.print(f"ready after {ready_s:.1f} s")
         for number in range(trials):
             seed = 1 + number % SCENES
@@ -174,6 +195,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="fras bench soak", description=__doc__)
     parser.add_argument("--trials", type=int, default=200)
     parser.add_argument("--mesh", metavar="X,Y,Z", help="node counts (default: the scenario's)")
+    parser.add_argument("--page", action="store_true", help="with a surgeon's page open")
     parser.add_argument("--json", type=Path, help="also write figures and samples there")
     parser.add_argument("--figure", type=Path, help="also draw them there")
     options = parser.parse_args()
@@ -181,7 +203,7 @@ def main() -> int:
         parser.error("--trials: at least one")
     console = Console()
     load_before = os.getloadavg()[0]
-    rows, ready_s = soak(options.trials, options.mesh, console)
+    rows, ready_s = soak(options.trials, options.mesh, console, page=options.page)
     verdicts = judged(rows)
     told = {
         **summary(rows),

@@ -3,6 +3,7 @@
 import threading
 from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Final
 
 import psutil
@@ -22,9 +23,16 @@ class ProcessGone(RuntimeError):
 
 
 class Watch:
-    """Knows the processes of a stack by their names, and the last health of each service."""
+    """Knows the processes of a stack by their names, and the last health of each service.
 
-    def __init__(self, bus: Bus) -> None:
+    Parameters
+    ----------
+    bus : Bus
+    others : mapping of str to int
+        Process ids that no supervisor knows, by name.
+    """
+
+    def __init__(self, bus: Bus, others: Mapping[str, int] = MappingProxyType({})) -> None:
         self._changed = threading.Condition()
         self._pids: dict[str, int] = {}
         self._health: dict[str, Health] = {}
@@ -34,7 +42,7 @@ class Watch:
             if not self._changed.wait_for(lambda: bool(self._pids), TIMEOUT_S):
                 raise ProcessGone("no supervisor says which processes there are")
             self._processes = {COMMAND: psutil.Process()} | {
-                name: psutil.Process(pid) for name, pid in self._pids.items()
+                name: psutil.Process(pid) for name, pid in (self._pids | dict(others)).items()
             }
 
     def sample(self, log_dir: Path) -> dict[str, dict[str, float]]:
