@@ -23,7 +23,10 @@ print(*(name for name in sys.argv[2:] if sys.modules.get(name) is not None))
         ("fras_sa.service", ("rich", "scipy", "numba")),
         ("fras_motion.service", ("rich", "scipy", "numba")),
         ("fras_sim.service", ("rich", "scipy.spatial", "meshio")),
-        ("fras_cli.app", ("numpy", "zenoh", "structlog", "fras_cli.failures")),
+        (
+            "fras_cli.app",
+            ("numpy", "scipy", "matplotlib", "zenoh", "structlog", "fras_cli.failures"),
+        ),
         # `fras stop`: a person waits for it.
         ("fras_cli.keep", ("matplotlib", "jinja2")),
     ],

@@ -9,6 +9,7 @@ from fras_cli.commands.bench import bench_app
 from fras_cli.commands.chaos import chaos_app
 from fras_cli.commands.keys import keys_app
 from fras_cli.commands.logs import log_app, logs_app
+from fras_cli.commands.results import results_app
 from fras_cli.commands.scenarios import scenario_app
 from fras_cli.commands.services import services_app
 from fras_cli.commands.stacks import compose_app, stacks_app
@@ -27,6 +28,7 @@ app = typer.Typer(
 for _group in (trials_app, stacks_app, logs_app, bench_app, chaos_app, services_app):
     app.add_typer(_group)
 for _name, _named in {
+    "experiment": results_app,
     "log": log_app,
     "scenario": scenario_app,
     "keys": keys_app,

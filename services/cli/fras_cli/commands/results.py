@@ -1,0 +1,87 @@
+"""`fras experiment report` and `compare`: options; `fras_experiments.results` does it."""
+
+import importlib
+from pathlib import Path
+from types import ModuleType
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+
+class CampaignOrCommand(TyperGroup):
+    """`fras experiment NAME` beside `fras experiment report DIR`.
+
+    What is no command of the group is handed to the one that runs a campaign, if there is one.
+    """
+
+    RUNS = "experiment"
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Put that command's name before arguments that name none."""
+        known = {*self.commands, *ctx.help_option_names}
+        if self.RUNS in self.commands and (not args or args[0] not in known):
+            args = [self.RUNS, *args]
+        return super().parse_args(ctx, args)
+
+
+results_app = typer.Typer(
+    cls=CampaignOrCommand, help="Campaigns of trials: run, report, compare.", no_args_is_help=True
+)
+
+Where = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="Only trials at this point of the sweep; may be repeated.", metavar="FIELD=VALUE"
+    ),
+]
+Seed = Annotated[int, typer.Option(min=0, help="Of the bootstraps.")]
+
+
+@results_app.command()
+def report(
+    folder: Annotated[Path, typer.Argument(help="A campaign's results.")],
+    figure: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Only this figure, and no summary: distributions, force, grasps, limit, planning."
+        ),
+    ] = None,
+    format: Annotated[str, typer.Option(help="Of the figures: png, svg, pdf.")] = "png",
+    seed: Seed = 0,
+) -> None:
+    """Write summary.md and the figures of a campaign anew, from what it stored."""
+    raise typer.Exit(_command().report(folder, names=figure or (), kind=format, seed=seed))
+
+
+@results_app.command()
+def compare(
+    a: Annotated[Path, typer.Argument(help="A campaign's results.")],
+    b: Annotated[Path, typer.Argument(help="Others, over the same seeds; may be the same folder.")],
+    where: Where = None,
+    where_a: Where = None,
+    where_b: Where = None,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON on standard output.")] = False,
+    out: Annotated[Path | None, typer.Option(help="A figure to write: .png, .svg or .pdf.")] = None,
+    seed: Seed = 0,
+) -> None:
+    """Compare two campaigns pair by pair: how large the change is, and whether chance makes it."""
+    both = where or []
+    raise typer.Exit(
+        _command().compare_campaigns(
+            a,
+            b,
+            where_first=[*both, *(where_a or [])],
+            where_second=[*both, *(where_b or [])],
+            as_json=json,
+            out=out,
+            seed=seed,
+        )
+    )
+
+
+def _command() -> ModuleType:
+    from fras_common.extras import require_extra
+
+    with require_extra("experiments"):
+        return importlib.import_module("fras_experiments.results.command")

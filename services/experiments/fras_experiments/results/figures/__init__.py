@@ -1,0 +1,59 @@
+"""The figures of a campaign, each a function from results to a matplotlib `Figure`."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+from matplotlib.figure import Figure
+
+from fras_experiments.results.figures.distributions import draw_distributions
+from fras_experiments.results.figures.force import draw_force
+from fras_experiments.results.figures.grasps import draw_grasps
+from fras_experiments.results.figures.limit import draw_limit
+from fras_experiments.results.figures.planning import draw_planning
+from fras_experiments.results.reading import Results
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A figure that every campaign can have.
+
+    Attributes
+    ----------
+    draw : callable
+        Takes results and the bootstraps' seed; None where the campaign has nothing to draw in it.
+    caption : str
+    """
+
+    draw: Callable[[Results, int], Figure | None]
+    caption: str
+
+
+FIGURES: Final = {
+    "distributions": Drawn(
+        draw_distributions,
+        "Visibility at the end and largest force, one point a trial, by scenario kind. Box: "
+        "quarters and median; diamond: mean with its 95 % interval.",
+    ),
+    "force": Drawn(
+        draw_force,
+        "Force against height while pulling, by scenario kind: each pull, the median (first pulls "
+        "solid, those after a re-plan dashed), and the middle half. A pull that was stopped at the "
+        "limit counts as at the limit higher up.",
+    ),
+    "grasps": Drawn(
+        draw_grasps,
+        "Where grasps land: on the tissue, and seen from the region of interest; the area of a "
+        "mark is the number of trials.",
+    ),
+    "limit": Drawn(
+        draw_limit,
+        "Survival of the limit (Kaplan-Meier, 95 % band): the share of pulls that are not yet "
+        "above it, against height. Marks: pulls that ended below it.",
+    ),
+    "planning": Drawn(
+        draw_planning,
+        "Planning time against N on logarithmic axes: ours (points: trials; line: power law "
+        "through the medians) and the paper's means (Table I).",
+    ),
+}
