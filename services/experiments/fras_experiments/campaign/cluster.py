@@ -1,7 +1,8 @@
 """Where workers come from: processes of our own, or a Dask cluster that is there."""
 
 import logging
-from collections.abc import Generator
+import time
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
@@ -13,6 +14,7 @@ from fras_cli.trial import NobodyRunsTrials
 
 CONNECT_S: Final = 10
 WORKERS_S: Final = 30
+POLL_S: Final = 0.2
 NO_DASHBOARD: Final = "no dashboard: Dask draws it with bokeh, which is not installed"
 
 
@@ -25,7 +27,9 @@ class NoWorker(NobodyRunsTrials):
 
 
 @contextmanager
-def connected(workers: int, scheduler: str | None, scratch: Path) -> Generator[Client]:
+def connected(
+    workers: int, scheduler: str | None, scratch: Path, stop: Callable[[], bool]
+) -> Generator[Client]:
     """Start workers of our own, or use those of a cluster; within the block.
 
     Parameters
@@ -36,37 +40,40 @@ def connected(workers: int, scheduler: str | None, scratch: Path) -> Generator[C
         Address, as `tcp://10.0.0.5:8786`.
     scratch : Path
         Where our own workers lay their files.
+    stop : callable
+        True ends the waiting for workers.
 
     Raises
     ------
     DeadScheduler, NoWorker
     """
+    # Whatever of it matters is told in our own words.
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
     if scheduler is not None:
-        with _client(scheduler) as client:
+        with _client(scheduler, stop) as client:
             yield client
         return
-    # bokeh is 60 MB with what it needs: the link is for who has it already.
-    dashboard = ":0" if find_spec("bokeh") else None
     options: dict[str, Any] = {
         "n_workers": workers,
         "threads_per_worker": 1,
         "processes": True,
         "memory_limit": None,
-        "dashboard_address": dashboard,
+        "dashboard_address": "127.0.0.1:0",
         "local_directory": str(scratch),
         "silence_logs": logging.CRITICAL,
     }
-    with LocalCluster(**options) as cluster, _client(str(cluster.scheduler_address)) as client:
+    with LocalCluster(**options) as cluster, _client(cluster.scheduler_address, stop) as client:
         yield client
 
 
 def dashboard_of(client: Client) -> str:
     """Return the link of the cluster's dashboard, or why there is none."""
-    return f"dashboard {client.dashboard_link}" if client.dashboard_link else NO_DASHBOARD
+    # bokeh is 60 MB with what it needs: the link is for who has it already.
+    return f"dashboard {client.dashboard_link}" if find_spec("bokeh") else NO_DASHBOARD
 
 
 @contextmanager
-def _client(address: str) -> Generator[Client]:
+def _client(address: str, stop: Callable[[], bool]) -> Generator[Client]:
     try:
         client = Client(address, timeout=CONNECT_S, set_as_default=False)
     except (OSError, ValueError) as error:
@@ -77,10 +84,11 @@ def _client(address: str) -> Generator[Client]:
         ) from error
     try:
         with client:
-            try:
-                client.wait_for_workers(1, timeout=WORKERS_S)
-            except TimeoutError as error:
-                raise no_worker(address) from error
+            until_s = time.monotonic() + WORKERS_S
+            while not client.nthreads() and not stop():
+                if time.monotonic() > until_s:
+                    raise no_worker(address)
+                time.sleep(POLL_S)
             yield client
     finally:
         client.close(timeout=1)

@@ -105,7 +105,7 @@ def _run(
     # What a command that was killed has left.
     shutil.rmtree(scratch, ignore_errors=True)
     try:
-        with connected(workers, scheduler, scratch) as client:
+        with connected(workers, scheduler, scratch, stop) as client:
             count = len(client.nthreads())
             text = f"{len(left)} trials on {count} {'worker' if count == 1 else 'workers'}"
             console.print(f"{text}; {dashboard_of(client)}", style="dim", soft_wrap=True)

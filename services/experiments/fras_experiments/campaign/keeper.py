@@ -117,11 +117,15 @@ class Keeper(WorkerPlugin):
     async def teardown(self, worker: Worker) -> None:
         """End the trial under way and the stack."""
         self._over = True
+        if self._idle is not None:
+            self._idle.cancel()
         await asyncio.to_thread(self._end)
 
     def run(self, task: Task) -> Done:
         """Run a trial; whatever becomes of it is told, not raised."""
         with self._turn:
+            if self._over:
+                return self._unable(task, "it was told to end")
             if self._idle is not None:
                 self._idle.cancel()
             try:
