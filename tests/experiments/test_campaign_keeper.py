@@ -1,7 +1,7 @@
 """A worker's stack: kept for many trials, replaced when it dies, ended with the worker."""
 
 import asyncio
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
@@ -42,7 +42,7 @@ class Stacks:
         self.measured = msgspec.structs.replace(whole, outcome="success", complete=True)
 
     @contextmanager
-    def own_stack(self, cell: str, connect: None, logs: Path, cancelled: Any) -> Iterator[Any]:
+    def own_stack(self, cell: str, connect: None, logs: Path, cancelled: Any) -> Generator[Any]:
         if self.cannot_start:
             self.cannot_start -= 1
             raise FrasError("the port is taken")
@@ -123,7 +123,12 @@ def test_a_trial_that_never_ends_costs_the_stack(stacks: Stacks):
 
 @pytest.mark.parametrize(
     ("keep", "ends", "files"),
-    [("failed", "success", 0), ("failed", "failed", 2), ("all", "success", 2), ("none", "failed", 0)],
+    [
+        ("failed", "success", 0),
+        ("failed", "failed", 2),
+        ("all", "success", 2),
+        ("none", "failed", 0),
+    ],
 )
 def test_logs_travel_back_as_asked(stacks: Stacks, keep: str, ends: str, files: int):
     stacks.measured = msgspec.structs.replace(stacks.measured, outcome=ends)
@@ -133,9 +138,7 @@ def test_logs_travel_back_as_asked(stacks: Stacks, keep: str, ends: str, files: 
     stacks.end(one)
 
 
-def test_who_cannot_run_trials_says_why(
-    stacks: Stacks, monkeypatch: pytest.MonkeyPatch
-):
+def test_who_cannot_run_trials_says_why(stacks: Stacks, monkeypatch: pytest.MonkeyPatch):
     stacks.cannot_start = 1
     one = stacks.worker()
     # A port may be taken in between: it is tried once more.

@@ -1,7 +1,7 @@
 """The results folder: nothing is lost, nothing is mixed up, nothing is written over."""
 
 import resource
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -33,7 +33,7 @@ def record(outcome: str = "success", series: int = 1) -> Record:
 
 
 @contextmanager
-def full_at(size: int) -> Iterator[None]:
+def full_at(size: int) -> Generator[None]:
     """No file may grow beyond this many bytes, as on a full disk."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))

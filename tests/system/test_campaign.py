@@ -5,7 +5,7 @@ import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -104,7 +104,7 @@ def free_port() -> int:
 
 
 @contextmanager
-def dask(folder: Path, *arguments: str) -> Iterator[subprocess.Popen[bytes]]:
+def dask(folder: Path, *arguments: str) -> Generator[subprocess.Popen[bytes]]:
     command = [sys.executable, "-m", "dask", *arguments]
     with (folder / f"{arguments[0]}.txt").open("wb") as sink:
         process = subprocess.Popen(

@@ -12,7 +12,7 @@ from rich.markup import escape
 from fras_cli.options import COMMAND_LINE, parse_seeds
 from fras_cli.run import EXIT_INTERRUPTED, EXIT_OK, caught_interrupts, default_out
 from fras_common.scenario import ScenarioError
-from fras_experiments.campaign.cluster import connected, dashboard_of
+from fras_experiments.campaign.cluster import connected
 from fras_experiments.campaign.code import code_version
 from fras_experiments.campaign.progress import Pace, shown
 from fras_experiments.campaign.reading import (
@@ -105,18 +105,17 @@ def _run(
     # What a command that was killed has left.
     shutil.rmtree(scratch, ignore_errors=True)
     try:
-        with connected(workers, scheduler, scratch, stop) as client:
-            count = len(client.nthreads())
+        with connected(workers, scheduler, scratch, stop) as cluster:
+            count = cluster.workers()
             text = f"{len(left)} trials on {count} {'worker' if count == 1 else 'workers'}"
-            console.print(f"{text}; {dashboard_of(client)}", style="dim", soft_wrap=True)
+            console.print(f"{text}; {cluster.dashboard()}", style="dim", soft_wrap=True)
             with shown(console, Pace(len(prepared.trials), records)) as tell:
 
                 def keep_and_tell(one: TrialSpec, record: Record) -> None:
                     records[one.number] = record
                     tell(one, record)
 
-                own = scheduler is None
-                Round(store, prepared, keep, own, stop, keep_and_tell).run(client, left)
+                Round(store, prepared, keep, stop, keep_and_tell).run(cluster, left)
     finally:
         shutil.rmtree(scratch, ignore_errors=True)
 

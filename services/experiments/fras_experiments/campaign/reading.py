@@ -238,7 +238,9 @@ def _toml(path: Path) -> dict[str, Any]:
 
 def _flat(table: object, leaves: tuple[str, ...] = ()) -> object:
     """Name fields by dotted paths: `a.b = 1`, `"a.b" = 1` and `[a] b = 1` say the same."""
-    return dict(_paths(table, "", leaves)) if isinstance(table, Mapping) else table
+    if not isinstance(table, Mapping):
+        return table
+    return dict(_paths(cast("Mapping[Any, Any]", table), "", leaves))
 
 
 def _paths(

@@ -1,6 +1,5 @@
 """Handing out the trials of a campaign, and keeping what comes back, until none is left."""
 
-import queue
 import time
 import uuid
 from collections.abc import Callable, Mapping
@@ -8,10 +7,9 @@ from dataclasses import dataclass
 from typing import Final
 
 import msgspec
-from distributed import Client, Future
 
 from fras_cli.trial import NobodyRunsTrials
-from fras_experiments.campaign.cluster import WORKERS_S, DeadScheduler, no_worker
+from fras_experiments.campaign.cluster import WORKERS_S, Cluster
 from fras_experiments.campaign.code import code_digest
 from fras_experiments.campaign.keeper import Done, Keeper, Task, run_task
 from fras_experiments.campaign.reading import Prepared
@@ -35,8 +33,6 @@ class Round:
     ----------
     keep : {"failed", "all", "none"}
         Whose logs are kept.
-    own : bool
-        Whether the workers are ours.
     stop : callable
         True ends it at once.
     tell : callable
@@ -46,12 +42,11 @@ class Round:
     store: Store
     prepared: Prepared
     keep: str
-    own: bool
     stop: Callable[[], bool]
     tell: Callable[[TrialSpec, Record], None]
 
-    def run(self, client: Client, left: Mapping[int, TrialSpec]) -> dict[int, Record]:
-        """Run the trials that are left, by their numbers; return the records of those that ended.
+    def run(self, cluster: Cluster, left: Mapping[int, TrialSpec]) -> None:
+        """Run the trials that are left, by their numbers, until all have ended.
 
         Raises
         ------
@@ -62,74 +57,39 @@ class Round:
         StoreUnwritable
         """
         name = f"campaign-{uuid.uuid4().hex[:8]}"
-        keeper = Keeper(name, self.prepared.mesh, self.keep, code_digest(), own=self.own)
-        ended: queue.SimpleQueue[Future] = queue.SimpleQueue()
-        futures: dict[str, tuple[TrialSpec, Future]] = {}
-        records: dict[int, Record] = {}
-        client.register_plugin(keeper)
+        keeper = Keeper(name, self.prepared.mesh, self.keep, code_digest(), own=cluster.own)
+        tasks = {
+            number: Task(name, number, msgspec.json.encode(one.scenario))
+            for number, one in left.items()
+        }
+        waiting = dict(left)
         try:
-            for number, one in left.items():
-                task = Task(name, number, msgspec.json.encode(one.scenario))
-                future = client.submit(run_task, task, key=f"{name}-{number}", pure=False)
-                futures[future.key] = (one, future)
-                future.add_done_callback(ended.put)
+            cluster.begin(name, keeper)
+            cluster.hand_out(run_task, tasks)
             looked_s = worked_s = time.monotonic()
-            while futures and not self.stop():
-                try:
-                    one, future = futures.pop(ended.get(timeout=POLL_S).key)
-                    done = self._outcome(client, one, future)
-                    records[one.number] = self._kept(one, done)
-                except queue.Empty:
-                    pass
-                if time.monotonic() - looked_s > LOOK_S:
-                    looked_s = time.monotonic()
-                    worked_s = looked_s if self._workers(client) else worked_s
-                    if looked_s - worked_s > WORKERS_S:
-                        raise no_worker(client.scheduler.address if client.scheduler else "?")
+            while waiting and not self.stop():
+                if (come := cluster.next(POLL_S)) is not None:
+                    number, done = come
+                    self._take(waiting.pop(number), done)
+                if (now_s := time.monotonic()) - looked_s > LOOK_S:
+                    looked_s = now_s
+                    worked_s = now_s if cluster.workers() else worked_s
+                    if now_s - worked_s > WORKERS_S:
+                        raise cluster.without_workers()
         finally:
-            self._part(client, name, [future for _, future in futures.values()])
-        return records
+            cluster.part()
 
-    def _outcome(self, client: Client, one: TrialSpec, future: Future) -> Done:
-        if future.status == "finished":
-            return future.result()
-        if future.status in ("cancelled", "lost"):
-            raise self._dead(client)
-        # It was tried on three workers, and each died of it.
-        reason = f"worker: {type(future.exception()).__name__}"
-        result = without_result(one.scenario, reason)
-        timing = Timing(worker="", wall_s=0.0, cpu_s=0.0)
-        return Done(one.number, Record(code=self.store.code, result=result, timing=timing), {})
-
-    def _kept(self, one: TrialSpec, done: Done) -> Record:
+    def _take(self, one: TrialSpec, done: object) -> None:
+        """Keep what came of a trial."""
+        if not isinstance(done, Done):
+            # Each of the workers that it was tried on died.
+            result = without_result(one.scenario, f"worker: {type(done).__name__}")
+            timing = Timing(worker="", wall_s=0.0, cpu_s=0.0)
+            record = Record(code=self.store.code, result=result, timing=timing)
+            done = Done(one.number, record, {})
         if done.record is None:
             raise WorkerUnable(
                 f"{done.problem}; what was kept is whole: mend it, and give the same command with "
                 f"--out {self.store.folder}"
             )
-        record = self.store.put(one.number, done.record, done.files)
-        self.tell(one, record)
-        return record
-
-    def _workers(self, client: Client) -> int:
-        try:
-            return len(client.nthreads())
-        except (OSError, TimeoutError) as error:
-            raise self._dead(client) from error
-
-    def _dead(self, client: Client) -> DeadScheduler:
-        address = client.scheduler.address if client.scheduler else "its address"
-        return DeadScheduler(
-            f"the scheduler at {address} has gone; what was kept is whole: give the same command "
-            f"with --out {self.store.folder} to go on",
-            address=address,
-        )
-
-    def _part(self, client: Client, name: str, futures: list[Future]) -> None:
-        """Leave the cluster as it was: nothing to do, no stack of ours."""
-        try:
-            client.cancel(futures, force=True)
-            client.unregister_worker_plugin(name)
-        except (OSError, TimeoutError, ValueError, RuntimeError):
-            # There is nobody to part from; workers end their stacks by themselves.
-            return
+        self.tell(one, self.store.put(one.number, done.record, done.files))

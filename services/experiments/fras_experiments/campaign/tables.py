@@ -3,7 +3,7 @@
 import csv
 import io
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Final
+from typing import Final, cast
 
 import msgspec
 
@@ -75,7 +75,7 @@ def cell(value: object) -> str:
         case float():
             return f"{value:.9g}"
         case list() | tuple():
-            return "x".join(cell(item) for item in value)  # pyright: ignore[reportUnknownVariableType]
+            return "x".join(cell(item) for item in cast("Sequence[object]", value))
         case _:
             return str(value)
 
