@@ -153,7 +153,7 @@ def test_who_cannot_run_trials_says_why(stacks: Stacks, monkeypatch: pytest.Monk
     assert "another version" in done.problem
     few = SimpleNamespace(free=10 * 2**20)
     monkeypatch.setattr(keeper.shutil, "disk_usage", lambda path: few)
-    assert "only 10 MiB are free" in one.run(task(0)).problem
+    assert "the disk is full: 10 MiB free" in one.run(task(0)).problem
     stacks.end(one)
 
 

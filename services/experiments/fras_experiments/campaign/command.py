@@ -84,7 +84,7 @@ def experiment(
                 )  # fmt: skip
         finally:
             store.write_tables(records)
-    _tell_end(console, folder, prepared, records)
+    _tell_end(console, folder, prepared, records, code_version())
     return EXIT_INTERRUPTED if interrupts.count else EXIT_OK
 
 
@@ -138,12 +138,19 @@ def _tell_begin(
 
 
 def _tell_end(
-    console: Console, folder: Path, prepared: Prepared, records: Mapping[int, Record]
+    console: Console,
+    folder: Path,
+    prepared: Prepared,
+    records: Mapping[int, Record],
+    code: str,
 ) -> None:
     counts = Counter(one.result.outcome for one in records.values())
     told = ", ".join(f"{count} {outcome}" for outcome, count in counts.most_common())
     total = len(prepared.trials)
     console.print(f"{len(records)} of {total} trials: {told or 'none'}", highlight=False)
+    if others := sum(one.code != code for one in records.values()):
+        text = f"{others} ran on another processor or other libraries: last digits may differ"
+        console.print(text, style="yellow")
     if len(records) < total:
         text = f"the same command with --out {folder} goes on"
         console.print(escape(text), style="yellow", soft_wrap=True)

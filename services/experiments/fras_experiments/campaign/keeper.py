@@ -140,8 +140,8 @@ class Keeper(WorkerPlugin):
             return self._unable(task, "its FRAS is another version than the one that asks")
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
-            if (room := shutil.disk_usage(self._folder).free) < ROOM_BYTES:
-                return self._unable(task, f"only {room >> 20} MiB are free in {self._folder}")
+            if full := self._full():
+                return self._unable(task, full)
             held = self._stack()
         except (FrasError, OSError) as error:
             return self._unable(task, f"no stack could be started: {error}")
@@ -155,6 +155,9 @@ class Keeper(WorkerPlugin):
         wall_s, cpu_s = time.monotonic() - began_s, max(0.0, _cpu_s() - cpu_began_s)
         timing = Timing(worker=self._worker, wall_s=round(wall_s, 3), cpu_s=round(cpu_s, 3))
         record = _record(given.scenario, folder / LOG, died, timing)
+        if record.result.outcome == "aborted" and (full := self._full()):
+            # It says nothing of the scene, and would not be run again.
+            return self._unable(task, full)
         ended_well = not died and record.result.outcome == SUCCESS and record.result.complete
         files: dict[str, bytes] = {}
         if self._keep == "all" or (self._keep == "failed" and not ended_well):
@@ -163,6 +166,12 @@ class Keeper(WorkerPlugin):
         if died or not held.used.link.wait_complete(READY_S):
             self._close()
         return Done(task.number, record, files)
+
+    def _full(self) -> str:
+        """Tell that a log may find no room; empty while it does."""
+        room = shutil.disk_usage(self._folder).free
+        short = room < ROOM_BYTES
+        return f"the disk is full: {room >> 20} MiB free in {self._folder}" if short else ""
 
     def _play(self, held: _Held, trial: str, given: TrialInput, folder: Path) -> str:
         """Run a trial; return why its stack serves no more, or nothing."""
