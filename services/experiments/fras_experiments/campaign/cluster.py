@@ -167,8 +167,7 @@ def connected(
     ------
     DeadScheduler, NoWorker
     """
-    # Whatever of it matters is told in our own words.
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    _silence()
     if scheduler is not None:
         with _client(scheduler) as client:
             cluster = Cluster(client, scheduler, own=False)
@@ -189,6 +188,13 @@ def connected(
         cluster = Cluster(client, address, own=True)
         cluster.wait_for_workers(stop)
         yield cluster
+
+
+def _silence() -> None:
+    """Leave what the libraries log: whatever of it matters is told in our own words."""
+    for name in list(logging.root.manager.loggerDict):
+        if name.partition(".")[0] in ("distributed", "tornado", "asyncio"):
+            logging.getLogger(name).setLevel(logging.CRITICAL + 1)
 
 
 @contextmanager
