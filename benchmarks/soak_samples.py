@@ -36,6 +36,7 @@ class Watch:
         self._changed = threading.Condition()
         self._pids: dict[str, int] = {}
         self._health: dict[str, Health] = {}
+        self._speak = {*SERVICES, *others}
         bus.subscribe(SUPERVISOR_STATUS, self._on_status)
         bus.subscribe(HEALTH, self._on_health)
         with self._changed:
@@ -71,8 +72,8 @@ class Watch:
         """Wait until each service has spoken since now."""
         with self._changed:
             self._health.clear()
-            if not self._changed.wait_for(lambda: self._health.keys() >= set(SERVICES), TIMEOUT_S):
-                silent = ", ".join(set(SERVICES) - self._health.keys())
+            if not self._changed.wait_for(lambda: self._health.keys() >= self._speak, TIMEOUT_S):
+                silent = ", ".join(self._speak - self._health.keys())
                 raise ProcessGone(f"no health of {silent}")
 
     def _on_status(self, status: SupervisorStatus) -> None:

@@ -16,7 +16,8 @@ from hypothesis import strategies as st
 
 from fras_common.bus import Bus, MemoryBus, MemoryFabric, RawSample
 from fras_common.bus.contract import OnMalformed
-from fras_common.bus.zenoh_bus import ZenohBus, route
+from fras_common.bus.zenoh_bus import ZenohBus
+from fras_common.bus.zenoh_router import route
 from fras_common.messages import Array
 
 WAIT_S = 10.0

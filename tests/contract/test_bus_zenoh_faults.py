@@ -12,7 +12,8 @@ from typing import Any
 import pytest
 
 from fras_common.bus import BusClosed, Call, RemoteFault
-from fras_common.bus.zenoh_bus import NoRouter, ZenohBus, route
+from fras_common.bus.zenoh_bus import NoRouter, ZenohBus
+from fras_common.bus.zenoh_router import route
 from fras_common.errors import FrasError
 from fras_common.messages import LogRecord, RecorderStatus, RestartReply, RestartRequest
 from fras_common.topics import LOG, RECORDER_STATUS, SUPERVISOR_RESTART

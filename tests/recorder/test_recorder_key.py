@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from fras_common.bus.zenoh_bus import ZenohBus, route
+from fras_common.bus.zenoh_bus import ZenohBus
+from fras_common.bus.zenoh_router import route
 from fras_common.messages import RecorderStatus
 from fras_common.topics import RECORDER_STATUS
 

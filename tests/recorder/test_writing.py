@@ -69,6 +69,33 @@ def test_what_publishers_cached_finds_room_while_a_log_is_taken_up(tmp_path: Pat
     writing.end()
 
 
+@pytest.mark.parametrize(("trial", "kept"), [("t-0", [7, 8]), ("", [7, 8]), ("t-1", [7, 5, 8])])
+def test_so_is_one_from_a_cache(tmp_path: Path, trial: str, kept: list[int]):
+    """What arms say has no trial; of such, 130 from before came into a log of `fras chaos`."""
+    posted: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+    facts: list[Any] = []
+    writing = Writing(posted.put, nothing, nothing, nothing)
+    log = AuditLog(tmp_path / "audit.mcap", LogHeading({}), 1)
+    ahead_ns = time.time_ns() + 3_600 * 10**9
+    first, old, now = (
+        RawSample("sa/verdict", encode(msgspec.structs.replace(one, source="sa/1", seq=seq)), "")
+        for one, seq in (
+            (msgspec.structs.replace(verdict(2, "t-1"), stamp_ns=2), 7),
+            (msgspec.structs.replace(verdict(3, trial), stamp_ns=ahead_ns), 5),
+            (msgspec.structs.replace(verdict(4, "t-1"), stamp_ns=ahead_ns + 1), 8),
+        )
+    )
+    log.write(first, 1)
+    cached = [first, old, now]
+    writing.open(lambda: Opened(log, Trial("t-1", 1), Completeness("t-1"), cached), nothing)
+    writing.close("closed", facts.append)
+    while not facts:
+        posted.get(timeout=30.0)()
+    written = [read_header(one.payload) for one in LogReader(tmp_path / "audit.mcap").messages()]
+    assert [header.seq for header in written if header is not None] == kept
+    writing.end()
+
+
 @pytest.mark.parametrize(("trial", "kept"), [("t-0", [7]), ("t-1", [7, 5])])
 def test_an_early_sample_of_another_trial_is_known_by_its_number(
     tmp_path: Path, trial: str, kept: list[int]

@@ -38,7 +38,7 @@ from fras_common.topics import (
 )
 from fras_planner.adapter import verified
 from fras_planner.approval import DecisionRequest, decision, judge
-from fras_planner.effects import Accept, Ask, AwaitDecision, AwaitResult, Effect, Say
+from fras_planner.effects import Accept, Ask, AwaitDecision, AwaitResult, Effect, Pause, Say
 from fras_planner.endings import PeerLost, TaskAborted
 from fras_planner.executive import Executive
 from fras_planner.memory import PlanRequest, Resumption
@@ -160,7 +160,7 @@ class _Audit:
                 return self._say(status)
             case Say():
                 return self._plans.popleft()
-            case Accept():
+            case Accept() | Pause():
                 return None
             case AwaitDecision(plan):
                 return self._decision(executive, plan)

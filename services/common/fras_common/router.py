@@ -34,7 +34,8 @@ def link(text: str) -> tuple[str, list[str]]:
 @silent_interrupt()
 def main(argv: list[str] | None = None) -> int:
     """Route until told to stop."""
-    from fras_common.bus.zenoh_bus import NoRouter, route
+    from fras_common.bus.settings import NoRouter
+    from fras_common.bus.zenoh_router import route
 
     parser = argparse.ArgumentParser(prog="fras router", description=__doc__)
     parser.add_argument(

@@ -273,9 +273,8 @@ class Writing:
     def _is_old(self, sample: RawSample, log: AuditLog, *, early: bool) -> bool:
         """Whether a log that was taken up holds a sample already, or shouldn't hold it.
 
-        Publishers send what they cache to every new subscriber, too; that is `early`. What was
-        sent since the log was taken up is recorded whatever its number: nobody can hide behind a
-        low one.
+        What publishers cache, and what came before the log was taken up, is `early`. What was sent
+        since is recorded whatever its number: nobody can hide behind a low one.
         """
         header = read_header(sample.payload)
         if header is None:
@@ -330,7 +329,7 @@ class Writing:
         self._post(lambda: done(facts, finished))
         arrival_ns = self._taken_up_ns = time.time_ns()
         for sample in opened.cached:
-            self._write(sample, arrival_ns)
+            self._write(sample, arrival_ns, early=True)
         self._write_early()
 
     def _close(self, reason: str, done: Callable[[Facts | None], None]) -> None:

@@ -1,4 +1,4 @@
-"""The bus over Zenoh; the only file that imports it.
+"""The bus over Zenoh.
 
 QoS, measured on this stack: a blocking congestion policy lets one frozen subscriber stop every
 put for seconds; dropping with recovery from the publisher's cache loses nothing and never blocks.
@@ -8,10 +8,9 @@ put for seconds; dropping with recovery from the publisher's cache loses nothing
 # pyright: reportUnknownMemberType=false, reportUnknownVariableType=false
 # pyright: reportUnknownArgumentType=false
 
-import json
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from typing import Any, Generic, TypeVar, cast
 
 import zenoh
@@ -23,17 +22,17 @@ from fras_common.bus.contract import (
     NoAnswer,
     OnMalformed,
     RawSample,
-    RemoteFault,
 )
 from fras_common.bus.hearing import Hearing
 from fras_common.bus.past import CACHES, Cached, Past
-from fras_common.bus.settings import NoRouter, Settings, client_settings, router_settings
+from fras_common.bus.settings import NoRouter, client_settings
 from fras_common.bus.shared import Answer, Stamper, received, wait_for
+from fras_common.bus.zenoh_wire import ENCODING, ZenohCall, configured, numbered, outcome, raw
 from fras_common.codec import MalformedMessage, decode, encode
 from fras_common.errors import FrasError
 from fras_common.identity import Identity, require_tls
 from fras_common.keeping import kept_of
-from fras_common.messages import Fault, Header
+from fras_common.messages import Header
 from fras_common.topics import Qos, Query, Topic
 
 M = TypeVar("M", bound=Header)
@@ -43,7 +42,6 @@ Rep = TypeVar("Rep")
 HEARTBEAT_S = 0.1
 # A publisher's latest number, as four bytes.
 BEAT_BYTES = 4
-ENCODING = zenoh.Encoding("application/msgpack")
 TOKENS = ("alive/**", "ready/**")
 # What was said before gives way to what is said now, health above all.
 _REPLIES = zenoh.ext.RepliesConfig(
@@ -97,7 +95,7 @@ class ZenohBus:
         self._declared: list[Any] = []
         try:
             settings = client_settings(cell, connect, open_timeout_s, identity)
-            self._session = zenoh.open(_config(settings))
+            self._session = zenoh.open(configured(settings))
         except zenoh.ZError as error:
             raise NoRouter.within(open_timeout_s, connect, identity, error) from error
 
@@ -177,10 +175,10 @@ class ZenohBus:
         hearing = Hearing(self._get_cached, callback)
 
         def note(sample: zenoh.Sample) -> None:
-            if (numbered := _numbered(sample)) is not None:
-                hearing.note(numbered)
+            if (heard := numbered(sample)) is not None:
+                hearing.note(heard)
             else:
-                hearing.pass_on(_raw(sample))
+                hearing.pass_on(raw(sample))
 
         def note_latest(beat: zenoh.Sample) -> None:
             payload = beat.payload.to_bytes()
@@ -228,8 +226,8 @@ class ZenohBus:
         timeout_s: float,
     ) -> None:
         def on_reply(reply: zenoh.Reply) -> None:
-            if reply.ok is not None and (numbered := _numbered(reply.ok)) is not None:
-                note(numbered)
+            if reply.ok is not None and (found := numbered(reply.ok)) is not None:
+                note(found)
 
         try:
             self._session.get(
@@ -256,9 +254,9 @@ class ZenohBus:
                 request = decode(query.request, payload, query.key, query.max_bytes)
             except MalformedMessage as error:
                 self._on_malformed(error)
-                _ZenohCall(asked, None).fail(error)
+                ZenohCall(asked, None).fail(error)
             else:
-                callback(_ZenohCall(asked, request))
+                callback(ZenohCall(asked, request))
 
         self._declared.append(self._session.declare_queryable(query.key, receive, complete=True))
 
@@ -275,11 +273,11 @@ class ZenohBus:
         refusals: list[FrasError] = []
 
         def on_reply(reply: zenoh.Reply) -> None:
-            outcome = _outcome(query, reply, timeout_s)
-            if isinstance(outcome, FrasError):
-                refusals.append(outcome)
+            came = outcome(query, reply, timeout_s)
+            if isinstance(came, FrasError):
+                refusals.append(came)
             else:
-                answer.settle(outcome)
+                answer.settle(came)
 
         def on_end() -> None:
             # Where each host has a supervisor all are asked, and one does it.
@@ -378,83 +376,3 @@ class _ZenohRawPublisher:
 
     def close(self) -> None:
         self._bus.undeclare(self._declared)
-
-
-class _ZenohCall:
-    def __init__(self, asked: zenoh.Query, request: Any) -> None:
-        self.request = request
-        self._asked = asked
-
-    def reply(self, reply: object) -> None:
-        self._asked.reply(self._asked.key_expr, encode(reply), encoding=ENCODING)
-        self._asked.drop()
-
-    def fail(self, error: FrasError) -> None:
-        fault = Fault(kind=error.kind, text=str(error))
-        self._asked.reply_err(encode(fault), encoding=ENCODING)
-        self._asked.drop()
-
-
-def _raw(sample: zenoh.Sample) -> RawSample:
-    return RawSample(str(sample.key_expr), sample.payload.to_bytes(), str(sample.encoding))
-
-
-def _numbered(sample: zenoh.Sample) -> Cached | None:
-    if (info := sample.source_info) is None:
-        return None
-    return Cached(_raw(sample), f"{info.source_id.zid}/{info.source_id.eid}", info.source_sn)
-
-
-def _outcome(query: Query[Any, Rep], reply: zenoh.Reply, timeout_s: float) -> Rep | FrasError:
-    try:
-        if reply.ok is not None:
-            return decode(query.reply, reply.ok.payload.to_bytes(), query.key)
-        payload = reply.err.payload.to_bytes() if reply.err is not None else b""
-        if payload == b"Timeout":
-            # Zenoh itself reports an expired query as an error reply.
-            return NoAnswer(query.key, timeout_s)
-        return RemoteFault(query.key, decode(Fault, payload, query.key))
-    except MalformedMessage as error:
-        return error
-
-
-def _config(settings: Settings) -> zenoh.Config:
-    config = zenoh.Config()
-    for key, value in settings.items():
-        config.insert_json5(key, json.dumps(value))
-    return config
-
-
-def route(
-    listen: Sequence[str],
-    until: Callable[[], None],
-    identity: Identity | None = None,
-    access: Mapping[str, object] | None = None,
-    connect: Sequence[str] = (),
-) -> None:
-    """Be a full Zenoh router on all of `listen` for as long as `until` blocks.
-
-    The link to each router in `connect` is made as soon as that router is there, and again
-    whenever it was lost. See `router_settings`.
-
-    Raises
-    ------
-    NoRouter
-        If the address can't be bound.
-    BadIdentity
-        If the endpoint is `tls/` without an identity, or another one with it.
-    """
-    for endpoint in listen:
-        require_tls(endpoint, identity)
-    if identity is not None:
-        # Who is not let in is told of on standard error, and so in the router's log.
-        zenoh.init_log_from_env_or("warn")
-    try:
-        session = zenoh.open(_config(router_settings(listen, identity, access, connect)))
-    except zenoh.ZError as error:
-        asked = ", ".join(listen)
-        raise NoRouter(f"cannot listen on {asked}: {error}", connect=asked) from error
-    try:
-        until()
-    finally:
-        session.close()
