@@ -152,9 +152,14 @@ class Keeper(WorkerPlugin):
         died = self._play(held, f"{self.name}-{task.number}", given, folder)
         if self._over:
             return self._unable(task, "it was told to end")
-        wall_s, cpu_s = time.monotonic() - began_s, max(0.0, _cpu_s() - cpu_began_s)
-        timing = Timing(worker=self._worker, wall_s=round(wall_s, 3), cpu_s=round(cpu_s, 3))
+        timing = Timing(worker=self._worker, wall_s=0.0, cpu_s=0.0)
         record = _record(given.scenario, folder / LOG, died, timing)
+        timing = msgspec.structs.replace(
+            record.timing,
+            wall_s=round(time.monotonic() - began_s, 3),
+            cpu_s=round(max(0.0, _cpu_s() - cpu_began_s), 3),
+        )
+        record = msgspec.structs.replace(record, timing=timing)
         if record.result.outcome == "aborted" and (full := self._full()):
             # It says nothing of the scene, and would not be run again.
             return self._unable(task, full)

@@ -68,7 +68,7 @@ class Timing(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     worker : str
         Name of the worker.
     wall_s, cpu_s : float [s]
-        Of the trial; processor time of its whole stack and its worker.
+        Of the trial and of making numbers of its log; processor time of stack and worker.
     plan_first_s, plan_median_s : float or None [s]
         Grounding and solving of its plans.
     """

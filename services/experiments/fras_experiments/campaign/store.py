@@ -118,14 +118,13 @@ class Store:
         StoreUnwritable
         """
         campaign, trials = self._prepared.campaign, self._prepared.trials
-        scenario = Path(campaign.scenario).stem
         content = {
             f"series/{number}.csv": tables.series_csv(record.series)
             for number, record in records.items()
         }
         content["timing.csv"] = tables.timing_csv(trials, records)
         content["trials.csv"] = tables.trials_csv(
-            campaign.name, scenario, campaign.varied, trials, records
+            campaign.name, self._prepared.base.name, campaign.varied, trials, records
         )
         try:
             (self.folder / "series").mkdir(exist_ok=True)
@@ -163,7 +162,7 @@ def opened(folder: Path, prepared: Prepared, code: str) -> Generator[Store]:
     OtherCampaign
         The folder holds another campaign's results, or this one's of another version of its file.
     FolderInUse
-        It holds something else, or another command is at work in it.
+        It holds something else, can't be made, or another command is at work in it.
     StoreUnwritable
     """
     store = Store(folder, prepared, code)
@@ -182,7 +181,12 @@ def opened(folder: Path, prepared: Prepared, code: str) -> Generator[Store]:
         _complete(folder, prepared)
         lock = marker.open("rb")
     except OSError as error:
-        raise store.unwritable(error) from error
+        if error.errno in FULL:
+            raise store.unwritable(error) from error
+        raise FolderInUse(
+            f"{folder}: can't be written ({error.strerror or error}): choose another --out",
+            path=folder,
+        ) from error
     with lock:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -26,7 +26,7 @@ def trials_csv(
     Parameters
     ----------
     campaign, scenario : str
-        Names.
+        Names of the campaign and of its base scenario.
     varied : sequence of str
         Paths of the fields that differ: each a column.
     records : mapping of int to Record
