@@ -107,7 +107,7 @@ def _run(
     try:
         with connected(workers, scheduler, scratch, stop) as cluster:
             count = cluster.workers()
-            text = f"{len(left)} trials on {count} {'worker' if count == 1 else 'workers'}"
+            text = f"to run: {len(left)}; workers: {count}"
             console.print(f"{text}; {cluster.dashboard()}", style="dim", soft_wrap=True)
             with shown(console, Pace(len(prepared.trials), records)) as tell:
 
