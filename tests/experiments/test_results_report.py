@@ -8,14 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import typer
 from matplotlib.collections import LineCollection, PathCollection
 from matplotlib.patches import Rectangle
 from PIL import Image
 from typer.testing import CliRunner
 
 from fras_cli.app import app
-from fras_cli.commands.results import CampaignOrCommand
 from fras_experiments.results import paper
 from fras_experiments.results.beside_paper import beside_paper
 from fras_experiments.results.command import write_report
@@ -340,19 +338,13 @@ def test_the_help_loads_neither_scipy_nor_matplotlib():
 
 
 def test_a_campaigns_name_stands_beside_the_commands():
-    group, asked = typer.Typer(cls=CampaignOrCommand, no_args_is_help=True), list[str]()
-
-    @group.command()
-    def experiment(name: str = typer.Argument(""), workers: int = 1) -> None:  # pyright: ignore[reportUnusedFunction]
-        asked.append(f"{name} {workers}")
-
-    @group.command()
-    def report(folder: str) -> None:  # pyright: ignore[reportUnusedFunction]
-        asked.append(f"report {folder}")
-
-    for words in (["no-limit", "--workers", "2"], ["--workers", "3", "mine"], ["report", "x"], []):
-        assert RUNNER.invoke(group, words).exit_code == 0
-    assert asked == ["no-limit 2", "mine 3", "report x", " 1"]
-    assert "report" in RUNNER.invoke(group, ["--help"]).stdout
-    # Without that command, as a group is: what it does not know is refused.
-    assert RUNNER.invoke(app, ["experiment", "no-such"]).exit_code == 2
+    for words, said in (
+        (["--list"], "retraction"),
+        (["run", "--list"], "retraction"),
+        (["no-such"], "no-such"),
+        (["report", "no-such"], "no-such"),
+        (["--help"], "compare"),
+        (["run", "--help"], "--scheduler"),
+    ):
+        done = RUNNER.invoke(app, ["experiment", *words])
+        assert said in done.output + str(done.exception), words

@@ -7,9 +7,9 @@ import typer
 
 from fras_cli.commands.bench import bench_app
 from fras_cli.commands.chaos import chaos_app
+from fras_cli.commands.experiment import experiment_app
 from fras_cli.commands.keys import keys_app
 from fras_cli.commands.logs import log_app, logs_app
-from fras_cli.commands.results import results_app
 from fras_cli.commands.scenarios import scenario_app
 from fras_cli.commands.services import services_app
 from fras_cli.commands.stacks import compose_app, stacks_app
@@ -25,10 +25,17 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 # Those without a name stand beside each other, as commands of `fras` itself.
-for _group in (trials_app, stacks_app, logs_app, bench_app, chaos_app, services_app):
+for _group in (
+    trials_app,
+    stacks_app,
+    logs_app,
+    bench_app,
+    chaos_app,
+    services_app,
+):
     app.add_typer(_group)
 for _name, _named in {
-    "experiment": results_app,
+    "experiment": experiment_app,
     "log": log_app,
     "scenario": scenario_app,
     "keys": keys_app,

@@ -15,7 +15,7 @@ from fras_cli.run import (
 from fras_cli.runtime import BadCell, BadRuntimeFolder, NoStack, SeveralStacks, StackExists
 from fras_cli.service_logs import NoLog
 from fras_cli.stack import OtherRules, StackIncomplete
-from fras_cli.trial import StackDied, TrialRefused
+from fras_cli.trial import NobodyRunsTrials, StackDied, TrialRefused
 from fras_cli.viewing import NoPage
 from fras_common.bus import NoAnswer
 from fras_common.bus.zenoh_bus import NoRouter
@@ -83,6 +83,7 @@ STACK_ERRORS = (
     NoPage,
     NoRouter,
     NoStack,
+    NobodyRunsTrials,
     SeveralStacks,
     NotReady,
     PortTaken,

@@ -50,6 +50,10 @@ class StackDied(FrasError):
     """A process of the stack ended in mid-trial."""
 
 
+class NobodyRunsTrials(FrasError):
+    """A campaign has no worker that can run its trials."""
+
+
 @dataclass
 class TrialView:
     """The latest of everything that a person wants to see."""

@@ -3,31 +3,11 @@
 import importlib
 from pathlib import Path
 from types import ModuleType
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
-from typer.core import TyperGroup
 
-
-class CampaignOrCommand(TyperGroup):
-    """`fras experiment NAME` beside `fras experiment report DIR`.
-
-    What is no command of the group is handed to the one that runs a campaign, if there is one.
-    """
-
-    RUNS = "experiment"
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Put that command's name before arguments that name none."""
-        known = {*self.commands, *ctx.help_option_names}
-        if self.RUNS in self.commands and (not args or args[0] not in known):
-            args = [self.RUNS, *args]
-        return super().parse_args(ctx, args)
-
-
-results_app = typer.Typer(
-    cls=CampaignOrCommand, help="Campaigns of trials: run, report, compare.", no_args_is_help=True
-)
+results_app = typer.Typer()
 
 Where = Annotated[
     list[str] | None,

@@ -7,14 +7,14 @@ from pathlib import Path
 
 from fras_cli.options import TrialInput
 from fras_cli.stack import Layout, UsedStack, own_stack
-from fras_cli.trial import TrialFollower, TrialView
-from fras_common.scenario import to_toml
+from fras_cli.trial import TrialFollower
 from fras_experiments.chaos.clocked import set_clock
 from fras_experiments.chaos.faults import VICTIMS, Fault, Kind
 from fras_experiments.chaos.hands import Hands
 from fras_experiments.chaos.injector import Injected, Injector
 from fras_experiments.chaos.link import HOST, SlowLink
 from fras_experiments.chaos.table import disturbed
+from fras_experiments.following import follow_to_end, lay_out
 from fras_supervisor import find_table, free_port
 
 READY_S = 120.0
@@ -54,22 +54,13 @@ class Stage:
             A process was given up, or has ended.
         TrialRefused, NoAnswer
         """
-        log = folder / "audit.mcap"
-        folder.mkdir(parents=True)
-        (folder / "scenario.toml").write_text(to_toml(given.scenario), encoding="utf-8")
+        log = lay_out(folder, given)
         self.injector.begin(trial, log, faults)
         try:
-            self.follower.start(trial, given.scenario, folder, given.mesh)
-            if not self.follower.follow(_unseen, stop=until):
-                self.follower.abort(ABORT)
-                self.follower.follow(_unseen, stop=lambda: False)
+            follow_to_end(self.follower, trial, given, folder, until, ABORT)
         finally:
             injected = self.injector.end()
         return log, injected
-
-
-def _unseen(view: TrialView) -> None:
-    """Nobody watches a trial of a campaign."""
 
 
 @contextmanager
