@@ -10,6 +10,7 @@ from fras_common.bus import MemoryBus, MemoryFabric, RawSample
 from fras_common.messages import Fault, TaskRequest, TaskStatus
 from fras_common.scenario import (
     AwarenessSection,
+    PatientSection,
     PlannerSection,
     RunSection,
     Scenario,
@@ -22,7 +23,7 @@ from fras_motion.service import MotionService
 from fras_planner.service import PlannerService
 from fras_recorder.service import RecorderService
 from fras_sa.service import AwarenessService
-from fras_sim.service import SimService
+from fras_sim.service import SimService, patient_service
 
 CELL: Final = "fuzz"
 PATIENCE_S: Final = 60.0
@@ -33,13 +34,14 @@ SCENARIO: Final = resolve(
         tissue=TissueSection(node_counts=(7, 9, 2)),
         awareness=AwarenessSection(blocks=5, no_limit=True),
         planner=PlannerSection(max_replans=1),
+        patient=PatientSection(young_modulus_factor=1.3),
         run=RunSection(pace=0.0, hold_timeout_s=0.0),
     )
 )
 
 
 class Stack:
-    """Five shells and a client.
+    """Six shells and a client.
 
     Parameters
     ----------
@@ -58,6 +60,7 @@ class Stack:
         shells: dict[str, Callable[[ServiceHost], Service]] = {
             "recorder": lambda host: RecorderService(host, below=folder, sign="no"),
             "sim": SimService,
+            "patient": patient_service,
             "sa": AwarenessService,
             "motion": MotionService,
             "planner": PlannerService,

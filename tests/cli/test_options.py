@@ -23,7 +23,7 @@ def test_default_scenario_file_holds_the_defaults_and_explains_every_field() -> 
     text = path.read_text()
     for section in msgspec.structs.fields(Scenario):
         kind: Any = section.type
-        if section.name == "scene":
+        if section.name in ("scene", "patient"):
             kind = kind.__args__[0]
         for field in getattr(kind, "__struct_fields__", ()):
             if field != "discs":  # a table of its own
@@ -32,7 +32,7 @@ def test_default_scenario_file_holds_the_defaults_and_explains_every_field() -> 
         assert field in text
 
 
-@pytest.mark.parametrize("name", ["default", "a", "b", "c"])
+@pytest.mark.parametrize("name", ["default", "a", "b", "c", "twin"])
 def test_shipped_scenarios_are_found_by_name_and_resolve(name: str) -> None:
     assert find_scenario(name) == shipped_scenarios() / f"{name}.toml"
     assert build_scenario(name).scene is not None

@@ -197,6 +197,8 @@ def _of(annotation: Any, metas: list[msgspec.Meta] | None = None) -> st.SearchSt
         return st.lists(_of(arguments[0]), max_size=2).map(origin)
     if origin is dict:
         return st.dictionaries(*[_of(part) for part in arguments], max_size=2)
+    if annotation is msgspec.UnsetType:
+        return st.just(msgspec.UNSET)
     if annotation is Array:
         return _arrays()
     if annotation is msgspec.Raw:

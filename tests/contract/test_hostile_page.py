@@ -11,7 +11,7 @@ from fras_common.topics import BULK, QUERIES, SMALL, TOPICS, Qos
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "hostile-input.md"
 ROWS = re.findall(r"^\| .* \| (\d+)(?: bytes)? \| `(\w+)\.(\w+)` \|$", PAGE.read_text(), re.M)
 MODULES = {
-    "topics": "fras_common.topics",
+    "rows": "fras_common.rows",
     "base": "fras_common.messages.base",
     "rates": "fras_common.service.rates",
     "host": "fras_common.service.host",

@@ -10,7 +10,16 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from fras_common.codec import decode, encode
-from fras_common.scenario import Scenario, SceneSection, check, load, resolve, to_toml
+from fras_common.scenario import (
+    Scenario,
+    ScenarioError,
+    SceneSection,
+    check,
+    load,
+    patient_scenario,
+    resolve,
+    to_toml,
+)
 
 
 @pytest.fixture(scope="module")
@@ -75,16 +84,20 @@ def made_possible(scenario: Scenario) -> Scenario:
         free_speed_m_s=min(motion.free_speed_m_s, fastest),
         holding_speed_m_s=min(motion.holding_speed_m_s, fastest),
     )
-    return check(
-        replace(
-            scenario,
-            tissue=tissue,
-            scene=scene,
-            generator=generator,
-            awareness=awareness,
-            motion=motion,
-        )
+    made = replace(
+        scenario,
+        tissue=tissue,
+        scene=scene,
+        generator=generator,
+        awareness=awareness,
+        motion=motion,
     )
+    if scene is not None:
+        try:
+            patient_scenario(made)
+        except ScenarioError:
+            made = replace(made, patient=msgspec.UNSET)
+    return check(made)
 
 
 def test_any_valid_scenario_survives_its_file(

@@ -15,7 +15,7 @@ KEYS = Path("/keys")
 WITH_KEYS = (*PLACEHOLDERS, "keys")
 
 
-@pytest.mark.parametrize("plain", ["local", "crtk"])
+@pytest.mark.parametrize("plain", ["local", "crtk", "twin"])
 def test_a_secure_table_is_the_plain_one_with_certificates(plain: str):
     before = load_table(find_table(plain)).processes
     after = Layout(plain, keys=KEYS).table().processes

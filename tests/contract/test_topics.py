@@ -15,7 +15,18 @@ from hypothesis import strategies as st
 from fras_common import messages
 from fras_common.codec import decode, encode, json_schema
 from fras_common.messages import Header
-from fras_common.topics import HEALTH, QUERIES, RPC, SERVICES, TOOLS, TOPICS, Query, Topic, topic_of
+from fras_common.topics import (
+    GUESTS,
+    HEALTH,
+    QUERIES,
+    RPC,
+    SERVICES,
+    TOOLS,
+    TOPICS,
+    Query,
+    Topic,
+    topic_of,
+)
 
 Strategies = Callable[[type[Any]], st.SearchStrategy[Any]]
 
@@ -59,13 +70,13 @@ def test_each_query_key_stands_once():
 
 @each_topic
 def test_the_producer_is_a_known_service(topic: Topic[Any]):
-    assert topic.producer in {*SERVICES, *TOOLS, "*", "arms", "client"}
+    assert topic.producer in {*SERVICES, *GUESTS, *TOOLS, "*", "client"}
     assert (topic.producer == "*") == ("{" in topic.key)
 
 
 @each_query
 def test_the_server_is_a_known_service_and_owns_the_key(query: Query[Any, Any]):
-    assert query.server in {*SERVICES, *TOOLS}
+    assert query.server in {*SERVICES, *GUESTS, *TOOLS}
     assert query.key.startswith(f"{query.server}/")
 
 

@@ -201,3 +201,12 @@ def test_both_arms_are_told(teller: Teller) -> None:
     (arms,) = tell(teller, "robot/state", made.robot(4))
     assert isinstance(arms, Arms)
     assert list(arms.instruments) == ["psm1", "psm2"]
+
+
+def test_of_a_patient_beside_its_model_nothing_is_drawn(teller: Teller) -> None:
+    assert len(tell(teller, "sim/tissue_model", made.model())) == 1
+    assert tell(teller, "patient/tissue_model", made.model()) == []
+    assert tell(teller, "patient/tissue_state", made.tissue(9)) == []
+    assert teller.malformed == 0
+    (shown,) = tell(teller, "sim/tissue_state", made.tissue(9))
+    assert isinstance(shown, Tissue)

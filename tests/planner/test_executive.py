@@ -13,9 +13,10 @@ from fras_common.messages import (
     PlannedAction,
     ResetReply,
 )
-from fras_common.scenario import PlannerSection
+from fras_common.scenario import PatientSection, PlannerSection, Scenario, patient_scenario
 from fras_common.topics import (
     EXECUTE,
+    PATIENT,
     RECORDER_OPEN,
     SA_CONTEXT,
     SIM_RESET,
@@ -48,6 +49,22 @@ def test_a_trial_resets_in_order_and_closes_its_log() -> None:
     assert world.asked[:4] == ["recorder/open", "motion/reset", "sim/reset", "sa/reset"]
     assert world.asked[-2:] == ["motion/cancel", "recorder/close"]
     assert [request.reason for request in world.requests] == ["initial", "exposure"]
+
+
+def test_a_patient_is_reset_behind_its_model_with_a_scenario_of_its_own() -> None:
+    class Noting(World):
+        def answer(self, ask: Ask) -> Any:
+            if ask.query.key.endswith("/reset"):
+                resets[ask.query.server] = ask.request.scenario
+            return super().answer(ask)
+
+    resets: dict[str, Scenario] = {}
+    patient = PatientSection(young_modulus_factor=1.3, disc_shift_m=0.005)
+    world = Noting([pulling(), []], EXPOSED, patient=patient)
+    assert world.run().outcome == "success"
+    assert list(resets) == ["motion", "sim", "patient", "sa"]
+    assert resets["patient"] == patient_scenario(world.scenario)
+    assert {resets[one] == world.scenario for one in ("motion", "sim", "sa")} == {True}
 
 
 def test_the_log_is_opened_with_the_rules_by_value() -> None:
@@ -268,6 +285,7 @@ def test_abort_stops_the_arms_and_closes_the_log() -> None:
     ("query", "error", "reason"),
     [
         (SIM_RESET, NoAnswer("sim/reset", 1.0), "hold:sim"),
+        (PATIENT.reset, NoAnswer("patient/reset", 1.0), "hold:patient"),
         (SA_CONTEXT, NoAnswer("sa/context", 1.0), "hold:sa"),
         (EXECUTE, PeerLost("gone", service="motion"), "hold:motion"),
         (
@@ -278,7 +296,8 @@ def test_abort_stops_the_arms_and_closes_the_log() -> None:
     ],
 )
 def test_service_that_fails_is_named(query: Any, error: FrasError, reason: str) -> None:
-    end = World([pulling()], EXPOSED, faults={query.key: error}).run()
+    world = World([pulling()], EXPOSED, faults={query.key: error}, patient=PatientSection())
+    end = world.run()
     assert (end.outcome, end.reason) == ("aborted", reason)
 
 

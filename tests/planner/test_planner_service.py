@@ -4,6 +4,7 @@ import time
 from collections.abc import Iterator
 from typing import Any
 
+import msgspec
 import pytest
 
 from fras_common.codec import content_digest
@@ -18,7 +19,7 @@ from fras_common.messages import (
     TaskRequest,
     TaskStatus,
 )
-from fras_common.scenario import RunSection, Scenario, resolve
+from fras_common.scenario import PatientSection, RunSection, Scenario, resolve
 from fras_common.topics import (
     ACTION_RESULT,
     MOTION_RESET,
@@ -74,6 +75,20 @@ def test_start_needs_a_resolved_scenario(bench: Bench) -> None:
     (unresolved,) = bench.task(scenario=Scenario())
     assert not unresolved.accepted
     assert bench.statuses == []
+
+
+def test_a_trial_with_a_patient_is_refused_where_none_is(bench: Bench) -> None:
+    scenario = msgspec.structs.replace(SCENARIO, patient=PatientSection())
+    (refused,) = bench.task(scenario=scenario)
+    assert not refused.accepted
+    assert "no process `patient`" in refused.reason
+    assert "--compose twin" in refused.reason
+    assert bench.statuses == []
+    bench.client.announce("alive/patient")
+    bench.settle()
+    answers = bench.task(scenario=scenario)
+    bench.run_until(lambda: answers)
+    assert answers[0].reason == "hold:recorder"
 
 
 def test_start_without_a_recorder_is_refused_with_the_reason(bench: Bench) -> None:

@@ -1,6 +1,6 @@
 """A close waits until every per-tick key and the status have come in."""
 
-from fras_recorder.completeness import PER_TICK, STATUS, Completeness
+from fras_recorder.completeness import PER_TICK, STATUS, WITH_PATIENT, Completeness
 
 
 def complete(last_tick: int = 5, status_seq: int = 3) -> Completeness:
@@ -49,4 +49,14 @@ def test_what_comes_late_takes_nothing_back():
     seen = complete()
     seen.note(PER_TICK[0], "t-1", 2, 7)
     seen.note(STATUS, "t-1", -1, 1)
+    assert seen.reached(5, 3)
+
+
+def test_a_trial_with_a_patient_is_complete_with_its_last_state():
+    seen = Completeness("t-1", per_tick=WITH_PATIENT)
+    for key in PER_TICK:
+        seen.note(key, "t-1", 5, 0)
+    seen.note(STATUS, "t-1", -1, 3)
+    assert not seen.reached(5, 3)
+    seen.note("patient/tissue_state", "t-1", 5, 0)
     assert seen.reached(5, 3)

@@ -54,7 +54,7 @@ def check(text: str) -> PyCompose:
     return made
 
 
-@pytest.mark.parametrize("name", ["local", "crtk", "odd"])
+@pytest.mark.parametrize("name", ["local", "crtk", "twin", "odd"])
 def test_it_is_what_the_specification_allows(name: str) -> None:
     made = check(compose_file(table(name)))
     assert set(made.service_names()) == set(table(name).processes)

@@ -26,7 +26,7 @@ from fras_common.messages import (
     TaskRequest,
     TaskStatus,
 )
-from fras_common.scenario import PlannerSection, Scenario, resolve
+from fras_common.scenario import PatientSection, PlannerSection, Scenario, resolve
 from fras_common.topics import (
     CANCEL,
     EXECUTE,
@@ -75,6 +75,7 @@ class World:
     faults: dict[str, FrasError] = field(default_factory=dict[str, FrasError])
     abort_at: str = ""
     planner: PlannerSection = field(default_factory=PlannerSection)
+    patient: PatientSection | msgspec.UnsetType = msgspec.UNSET
     asked: list[str] = field(default_factory=list[str])
     requests: list[PlanRequest] = field(default_factory=list[PlanRequest])
     said: list[Plan | TaskStatus] = field(default_factory=list[Plan | TaskStatus])
@@ -93,7 +94,7 @@ class World:
 
     @property
     def scenario(self) -> Scenario:
-        return resolve(Scenario(planner=self.planner))
+        return resolve(Scenario(planner=self.planner, patient=self.patient))
 
     def make_plan(self, context: Context, request: PlanRequest) -> Plan:
         self.requests.append(request)
@@ -221,7 +222,7 @@ class World:
             return CancelReply(tick=self.tick)
         if ask.query is RECORDER_OPEN:
             self.opened = request
-        return ResetReply(digest=content_digest("t", self.scenario, b""))
+        return ResetReply(digest=content_digest("t", request.scenario, b""))
 
     def monitor(self, expected: list[str]) -> list[Monitored]:
         """Answer as situation awareness does: one entry for each expectation."""

@@ -14,7 +14,7 @@ from fras_audit.report import Report
 from fras_common.errors import FrasError
 
 # By how long it takes: a fault in the fast ones is told before the tissue is computed.
-SERVICES: tuple[str, ...] = ("sa", "planner", "motion", "sim")
+SERVICES: tuple[str, ...] = ("sa", "planner", "motion", "sim", "patient")
 
 Audit = Callable[[Recorded, Progress], list[Tally]]
 

@@ -46,7 +46,7 @@ from fras_motion.trial import CANCELLER, MotionTrial
 # Answered while a goal is under way, and so asked of the same state.
 MEANWHILE = ("busy", "goal_used")
 # Ends that a clock or a client decided, which no verdict leads to.
-_BY_OTHERS = {"cancelled", "reset", "hold:sim", "hold:sa"}
+_BY_OTHERS = {"cancelled", "reset", "hold:sim", "hold:patient", "hold:sa"}
 
 
 class _Lost(Exception):

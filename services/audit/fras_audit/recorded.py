@@ -8,7 +8,7 @@ from typing import Any, TypeVar, cast
 from fras_common import messages as m
 from fras_common import topics as t
 from fras_common.codec import MalformedMessage, decode, read_header
-from fras_common.scenario import Scenario
+from fras_common.scenario import Scenario, patient_scenario
 from fras_common.topics import Query, Topic
 from fras_log import RawMessage
 
@@ -20,6 +20,9 @@ READ: tuple[Topic[Any], ...] = (
     t.TISSUE_MODEL,
     t.TISSUE_STATE,
     t.SIM_CHECKPOINT,
+    t.PATIENT.model,
+    t.PATIENT.state,
+    t.PATIENT.checkpoint,
     t.ROBOT_STATE,
     t.VERDICT,
     t.CONTEXT,
@@ -90,14 +93,16 @@ class Recorded:
     def reset(self, query: Query[m.ResetRequest, m.ResetReply]) -> m.ResetRequest | None:
         """Return the reset that began the trial for a service; None if the log does not hold it.
 
-        Without the mirror the recorder's scenario serves, where no mesh file belongs to it.
+        Without the mirror the recorder's scenario serves, where no mesh file belongs to it; for the
+        patient, what is derived from it.
         """
         for mirror in self.mirrors(query):
             if mirror.fault is None:
                 return request_of(query, mirror)
         if self.scenario.tissue.mesh_file is not None:
             return None
-        return m.ResetRequest(trial=self.trial, scenario=self.scenario)
+        own = self.scenario if query != t.PATIENT.reset else patient_scenario(self.scenario)
+        return m.ResetRequest(trial=self.trial, scenario=own) if own is not None else None
 
     def take(self, message: RawMessage) -> None:
         """Add a message of the log; those of other keys and of other trials are passed over."""

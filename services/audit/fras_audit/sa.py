@@ -11,6 +11,7 @@ from fras_common import messages as m
 from fras_common.errors import FrasError
 from fras_common.topics import (
     CONTEXT,
+    PATIENT,
     ROBOT_STATE,
     SA_CONTEXT,
     SA_RESET,
@@ -47,6 +48,7 @@ class _Audit:
         self._tallies = [self._verdicts, self._contexts, self._targets]
         self._robots = first_of_tick(recorded.of(ROBOT_STATE))
         self._tissues = first_of_tick(recorded.of(TISSUE_STATE))
+        self._patients = first_of_tick(recorded.of(PATIENT.state))
         self._said = by_tick(recorded.of(VERDICT))
         self._told = by_tick(recorded.of(CONTEXT))
         # A context in the mirror is numbered like the one published.
@@ -79,16 +81,17 @@ class _Audit:
 
     def _judge(self, watched: WatchedTrial, tick: int) -> bool:
         """Judge one tick; False if what it needs is not in the log."""
-        missing = [
-            topic.key
-            for topic, states in ((ROBOT_STATE, self._robots), (TISSUE_STATE, self._tissues))
-            if tick not in states
-        ]
+        needed = {ROBOT_STATE.key: self._robots, TISSUE_STATE.key: self._tissues}
+        if watched.has_patient:
+            needed[PATIENT.state.key] = self._patients
+        missing = [key for key, states in needed.items() if tick not in states]
         if missing:
             self._stop(f"not derived from tick {tick} on: the log lacks {' and '.join(missing)}")
             return False
         watched.see_state(self._robots[tick])
         watched.see_state(self._tissues[tick])
+        if watched.has_patient:
+            watched.see_patient(self._patients[tick])
         verdict = watched.judge_next()
         if verdict is None:
             self._stop(f"not derived from tick {tick} on: its states do not belong together")

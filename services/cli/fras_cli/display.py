@@ -7,7 +7,7 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from fras_cli.report import Percentiles, Summary, specifications_in_words
+from fras_cli.report import Percentiles, Summary, patient_in_words, specifications_in_words
 from fras_cli.trial import TrialView
 from fras_common.messages import Verdict
 
@@ -141,6 +141,7 @@ def print_summary(console: Console, summary: Summary, places: Iterable[tuple[str
         ("plans", f"{summary.plans}, of them {summary.replans} re-plans"),
         ("visibility", "unknown" if summary.visibility is None else f"{summary.visibility:.1%}"),
         ("largest force", _force_words(summary)),
+        *(("patient", sentence) for sentence in patient_in_words(summary)),
         ("specifications", specifications_in_words(summary)),
         ("time", f"{summary.sim_s:.1f} s simulated in {summary.wall_s:.1f} s"),
         ("a tick", f"{_duration(summary.tick_ms)}; finite elements {_duration(summary.fe_ms)}"),

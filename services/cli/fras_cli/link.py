@@ -97,6 +97,11 @@ class Link:
         with self._changed:
             return self._changed.wait_for(lambda: not self.missing(), timeout_s)
 
+    def wait_ready(self, service: str, timeout_s: float) -> bool:
+        """Wait until one service, which not every stack has, is ready; False if not in time."""
+        with self._changed:
+            return self._changed.wait_for(lambda: f"ready/{service}" in self.tokens(), timeout_s)
+
     def close(self) -> None:
         """Close the bus if it was opened."""
         if self._bus is not None:

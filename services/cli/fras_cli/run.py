@@ -5,6 +5,7 @@ import signal
 import time
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from types import FrameType
@@ -15,6 +16,7 @@ from rich.markup import escape
 
 from fras_cli.confirm import Confirmation
 from fras_cli.display import LiveDisplay, print_summary
+from fras_cli.patient import require_ready
 from fras_cli.report import Summary, write_report
 from fras_cli.stack import USUAL, Layout, UsedStack, use_stack
 from fras_cli.trial import StackDied, TrialFollower, TrialView
@@ -141,6 +143,7 @@ def run_trials(
         0 if every trial was a success, 1 if not, 130 if interrupted.
     """
     folders = trial_folders(scenarios, out)
+    has_patient = any(scenario.has_patient for scenario in scenarios)
     outcomes: list[str] = []
     under_way: list[Path] = []
     with (
@@ -153,11 +156,13 @@ def run_trials(
             out / "logs",
             cancelled=lambda: interrupts.count > 0,
             tell=lambda words: console.print(words, style="dim"),
-            layout=layout,
+            layout=replace(layout, patient=has_patient),
             report=supervisor_lines(console),
         ) as stack,
         view_beside(cell, stack.link.connect, page),
     ):
+        if has_patient:
+            require_ready(stack.link)
         follower = TrialFollower(stack)
         for scenario, folder in zip(scenarios, folders, strict=True):
             if not stack.own:

@@ -8,12 +8,12 @@ from pathlib import Path
 from types import MappingProxyType
 
 from fras_cli import runtime
+from fras_cli.absence import Absence
 from fras_cli.link import NAME, Link, identity_for
 from fras_cli.own_keys import ready_keys, require_keys
+from fras_cli.patient import require_process
 from fras_common.errors import FrasError
 from fras_common.identity import default_keys_dir
-from fras_common.messages import SupervisorStatus
-from fras_common.topics import SUPERVISOR_STATUS
 from fras_supervisor import (
     Endpoint,
     Stack,
@@ -32,8 +32,8 @@ from fras_supervisor.supervision import NAME as SUPERVISOR
 from fras_supervisor.table import PLACEHOLDERS
 
 COMPLETE_TIMEOUT_S = 5.0
-ABSENCE_S = 3.0
 PATIENCE_S = 3.0
+USUAL_TABLE = "local"
 
 
 class OtherRules(FrasError):
@@ -56,13 +56,17 @@ class Layout:
         Which host of the table this machine is; empty: all of it runs here.
     addresses : mapping of str to str
         Where the routers of hosts are.
+    patient : bool
+        A patient has to be among its processes: the usual table is then `twin`. Nothing that a
+        person has asked for, so it makes no other layout.
     """
 
-    compose: str = "local"
+    compose: str = USUAL_TABLE
     asp_dir: Path | None = None
     keys: Path | None = None
     host: str = ""
     addresses: Mapping[str, str] = field(default_factory=dict[str, str])
+    patient: bool = field(default=False, compare=False)
 
     def table(self) -> Table:
         """Read the process table.
@@ -70,10 +74,13 @@ class Layout:
         Raises
         ------
         TableError
+        NoPatient
         """
         path = Path(self.compose)
         path = path if path.suffix == ".toml" else find_table(self._shipped())
         table = load_table(path, (*PLACEHOLDERS, "keys"))
+        if self.patient:
+            require_process(table)
         if self.keys is not None:
             require_keys(table)
         return table
@@ -121,9 +128,10 @@ class Layout:
         return [Endpoint.parse(mine).host] if mine else []
 
     def _shipped(self) -> str:
+        compose = "twin" if self.patient and self.compose == USUAL_TABLE else self.compose
         if self.keys is None:
-            return self.compose
-        return "secure" if self.compose == "local" else f"secure-{self.compose}"
+            return compose
+        return "secure" if compose == USUAL_TABLE else f"secure-{compose}"
 
     @property
     def protocol(self) -> str:
@@ -137,7 +145,7 @@ class Layout:
 
     def in_words(self) -> str:
         """Options that ask for it; empty for the usual one."""
-        asked = [] if self.compose == "local" else [f"--compose {self.compose}"]
+        asked = [] if self.compose == USUAL_TABLE else [f"--compose {self.compose}"]
         asked += ["--secure"] if self.keys is not None else []
         asked += [f"--host {self.host}"] if self.host else []
         return " ".join([*asked, *([f"--asp-dir {self.asp_dir}"] if self.asp_dir else [])])
@@ -194,54 +202,6 @@ class UsedStack:
     own: bool
     watch: Callable[[], str]
     elsewhere: Mapping[str, str] = field(default_factory=dict[str, str])
-
-
-class Absence:
-    """Watches a stack that others keep: who has gone for good, or stays away.
-
-    A supervisor says who is not started again; where none speaks, a service that is away for long
-    has gone.
-
-    Parameters
-    ----------
-    link : Link
-    """
-
-    def __init__(self, link: Link) -> None:
-        self._link = link
-        self._since_s: float | None = None
-        self._heard: dict[str, tuple[SupervisorStatus, float]] = {}
-        link.bus.subscribe(SUPERVISOR_STATUS, self._on_status)
-
-    def look(self) -> str:
-        """Name those that have gone; empty while all are there or may come back."""
-        now_s = time.monotonic()
-        heard = [one for one, at_s in self._heard.values() if now_s - at_s < ABSENCE_S]
-        if heard:
-            self._since_s = None
-            return "; ".join(gone for one in heard if (gone := gone_for_good(one)))
-        missing = self._link.missing()
-        if not missing:
-            self._since_s = None
-            return ""
-        self._since_s = self._since_s or now_s
-        gone = now_s - self._since_s >= ABSENCE_S
-        return f"{', '.join(missing)} of cell {self._link.cell} have gone" if gone else ""
-
-    def _on_status(self, status: SupervisorStatus) -> None:
-        # On each host there may be one.
-        self._heard[status.host] = (status, time.monotonic())
-
-
-def gone_for_good(status: SupervisorStatus) -> str:
-    """Tell which processes are not started again, in words; empty if all are there or may be."""
-    return "; ".join(
-        f"{one.name} was given up, it ended {one.last_exit}"
-        if one.state == "given_up"
-        else f"{one.name} ended {one.last_exit}"
-        for one in status.processes
-        if one.state in ("given_up", "ended")
-    )
 
 
 def _not_told(level: str, text: str) -> None:

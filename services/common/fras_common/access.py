@@ -11,11 +11,11 @@ from types import MappingProxyType
 from typing import Any
 
 from fras_common.provenance import ARM_DRIVERS
-from fras_common.topics import QUERIES, SERVICES, TOOLS, TOPICS, Qos, Query, Topic
+from fras_common.topics import GUESTS, QUERIES, SERVICES, TOOLS, TOPICS, Qos, Query, Topic
 
 PARTICIPANTS: tuple[str, ...] = (
     *SERVICES,
-    "arms",
+    *GUESTS,
     *TOOLS,
     "cli",
     "client",

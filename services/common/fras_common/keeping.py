@@ -2,10 +2,11 @@
 
 from typing import Final
 
+from fras_common.rows import KEPT
 from fras_common.topics import (
     FAULT,
+    GUESTS,
     HEALTH,
-    KEPT,
     LOG,
     QUERIES,
     SERVICES,
@@ -20,7 +21,7 @@ _BY_MIRROR: Final = {query.mirror: query.kept for query in QUERIES}
 _MEMBERS: Final = tuple(
     topic.of(service=service).key
     for topic in (HEALTH, LOG, FAULT)
-    for service in (*SERVICES, *TOOLS, "arms")
+    for service in (*SERVICES, *GUESTS, *TOOLS)
 )
 _OURS: Final = frozenset([*(one.key for one in TOPICS), *_BY_MIRROR, *_MEMBERS])
 

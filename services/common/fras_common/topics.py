@@ -4,124 +4,64 @@ Publishers, subscribers, recorder, documentation and contract tests are all gene
 A key may hold one placeholder, `{name}`, for a family of keys (`health/{service}`).
 """
 
-from dataclasses import dataclass, replace
-from enum import StrEnum
-from typing import Any, Final, Generic, TypeVar
+from dataclasses import dataclass
+from typing import Any, Final, TypeVar
 
 from fras_common import messages as m
-from fras_common.codec import MAX_MESSAGE_BYTES
+from fras_common.rows import BULK, FEW, SMALL, SOME, WORDY, Qos, Query, Topic
 
 M = TypeVar("M", bound=m.Header)
-Req = TypeVar("Req")
-Rep = TypeVar("Rep")
 
-SMALL: Final = 64 * 2**10
-"""Commands and questions [bytes]: names, a few numbers, a sentence."""
-USUAL: Final = 2**20
-"""What says how things stand [bytes]."""
-WORDY: Final = 16 * 2**20
-"""Contexts and plans [bytes]: thousands of atoms, at the finest grid of blocks."""
-BULK: Final = MAX_MESSAGE_BYTES
-"""What carries a mesh, or other messages [bytes]."""
-
-KEPT: Final = 1000
-"""Messages of a key: five seconds of ticks as fast as possible, or hundreds of a trial's events."""
-SOME: Final = 100
-"""Of what is larger and comes less often."""
-FEW: Final = 16
-"""Of what carries a mesh or other messages, and comes a few times in a trial."""
-
-
-class Qos(StrEnum):
-    """How a topic travels, and why.
-
-    STATE: reliable, dropped under congestion and then recovered from the publisher's cache;
-    never blocking, because one frozen subscriber would stop the loop for everyone.
-    EVENT: the same, and the last value is kept for whoever comes later (latched).
-    TELEMETRY: best effort; the next one replaces a lost one.
-    COMMAND: reliable, but never kept: what was told to an arm before it listened, or while the
-    network was cut, must not move it later.
-    """
-
-    COMMAND = "command"
-    STATE = "state"
-    EVENT = "event"
-    TELEMETRY = "telemetry"
+ANYONE: tuple[str, ...] = ("*",)
+PEOPLE: tuple[str, ...] = ("cli", "monitor")
+"""Where a person stands behind the question."""
+EXECUTIVE: tuple[str, ...] = ("planner",)
 
 
 @dataclass(frozen=True)
-class Topic(Generic[M]):
-    """One published key.
+class TissueTopics:
+    """A simulator's keys: what it says of its tissue, and the question that puts it to rest.
 
     Attributes
     ----------
-    producer : str
-        A service; `*`: each of them; `arms`: whoever drives the robot; `client`: anyone.
-    in_trial : bool
-        Belongs to a trial: a service drops and counts it outside the trial of its last reset.
-    max_bytes : int
-        A longer payload is malformed, whatever it says.
-    kept : int
-        How many the publisher keeps for who lost them or comes late, and the recorder remembers.
+    service : str
+        Who speaks there; first chunk of each key.
     """
 
-    key: str
-    type: type[M]
-    producer: str
-    qos: Qos
-    when: str
-    in_trial: bool = True
-    max_bytes: int = USUAL
-    kept: int = KEPT
+    service: str
+    model: Topic[m.TissueModel]
+    state: Topic[m.TissueState]
+    checkpoint: Topic[m.SimCheckpoint]
+    reset: Query[m.ResetRequest, m.ResetReply]
 
-    def of(self, **names: str) -> "Topic[M]":
-        """Fill the placeholder: `HEALTH.of(service="sim")`."""
-        return replace(self, key=self.key.format(**names))
-
-    @property
-    def wildcard(self) -> str:
-        """Key expression that matches the whole family."""
-        head, brace, _ = self.key.partition("{")
-        return f"{head}**" if brace else self.key
-
-
-@dataclass(frozen=True)
-class Query(Generic[Req, Rep]):
-    """One question that one service answers; mirrored on `rpc/<server>/<name>`.
-
-    Attributes
-    ----------
-    askers : tuple of str
-        Whose certificates may ask it under the security profile; `*`: each. Nobody by default.
-    max_bytes : int
-        A longer request is malformed.
-    kept : int
-        How many mirrors the publisher keeps, and the recorder remembers.
-    """
-
-    key: str
-    request: type[Req]
-    reply: type[Rep]
-    server: str
-    askers: tuple[str, ...] = ()
-    max_bytes: int = SMALL
-    kept: int = KEPT
-
-    @property
-    def mirror(self) -> str:
-        """Key of the mirror."""
-        return f"rpc/{self.server}/{self.key.partition('/')[2]}"
+    @classmethod
+    def of(cls, service: str) -> "TissueTopics":
+        """Make the rows of a simulator."""
+        model = Topic(
+            f"{service}/tissue_model", m.TissueModel, service, Qos.EVENT, "each reset",
+            max_bytes=BULK, kept=FEW,
+        )  # fmt: skip
+        state = Topic(
+            f"{service}/tissue_state", m.TissueState, service, Qos.STATE, "each tick",
+            max_bytes=BULK,
+        )  # fmt: skip
+        checkpoint = Topic(
+            f"{service}/checkpoint", m.SimCheckpoint, service, Qos.STATE, "every 10 ticks",
+            max_bytes=BULK, kept=SOME,
+        )  # fmt: skip
+        reset = Query(
+            f"{service}/reset", m.ResetRequest, m.ResetReply, service, EXECUTIVE,
+            max_bytes=BULK, kept=FEW,
+        )  # fmt: skip
+        return cls(service, model, state, checkpoint, reset)
 
 
-TISSUE_MODEL = Topic(
-    "sim/tissue_model", m.TissueModel, "sim", Qos.EVENT, "each reset", max_bytes=BULK, kept=FEW
-)
-TISSUE_STATE = Topic(
-    "sim/tissue_state", m.TissueState, "sim", Qos.STATE, "each tick", max_bytes=BULK
-)
-SIM_CHECKPOINT = Topic(
-    "sim/checkpoint", m.SimCheckpoint, "sim", Qos.STATE, "every 10 ticks", max_bytes=BULK, kept=SOME
-)
+TWIN: Final = TissueTopics.of("sim")
+"""The model of the tissue: what is believed of it."""
+PATIENT: Final = TissueTopics.of("patient")
+"""The tissue itself, where a trial has one besides its model: what is seen of it."""
+
+TISSUE_MODEL, TISSUE_STATE, SIM_CHECKPOINT = TWIN.model, TWIN.state, TWIN.checkpoint
 ROBOT_STATE = Topic("robot/state", m.RobotState, "motion", Qos.STATE, "each tick")
 VERDICT = Topic("sa/verdict", m.Verdict, "sa", Qos.STATE, "each tick")
 CONTEXT = Topic("sa/context", m.Context, "sa", Qos.EVENT, "on request", max_bytes=WORDY, kept=SOME)
@@ -282,6 +222,9 @@ TOPICS: tuple[Topic[Any], ...] = (
     TISSUE_MODEL,
     TISSUE_STATE,
     SIM_CHECKPOINT,
+    PATIENT.model,
+    PATIENT.state,
+    PATIENT.checkpoint,
     ROBOT_STATE,
     VERDICT,
     CONTEXT,
@@ -299,11 +242,6 @@ TOPICS: tuple[Topic[Any], ...] = (
     RPC,
     *(topic for arm in CRTK for topic in arm.all),
 )
-
-ANYONE: tuple[str, ...] = ("*",)
-PEOPLE: tuple[str, ...] = ("cli", "monitor")
-"""Where a person stands behind the question."""
-EXECUTIVE: tuple[str, ...] = ("planner",)
 
 # A stop from anybody is safe; what lifts one or begins a motion is not.
 TASK = Query(
@@ -325,9 +263,7 @@ RESUME = Query("motion/resume", m.ResumeRequest, m.HoldState, "motion", (*PEOPLE
 MOTION_RESET = Query(
     "motion/reset", m.ResetRequest, m.ResetReply, "motion", EXECUTIVE, max_bytes=BULK, kept=FEW
 )
-SIM_RESET = Query(
-    "sim/reset", m.ResetRequest, m.ResetReply, "sim", EXECUTIVE, max_bytes=BULK, kept=FEW
-)
+SIM_RESET = TWIN.reset
 SA_RESET = Query(
     "sa/reset", m.ResetRequest, m.ResetReply, "sa", EXECUTIVE, max_bytes=BULK, kept=FEW
 )
@@ -356,6 +292,7 @@ QUERIES: tuple[Query[Any, Any], ...] = (
     RESUME,
     MOTION_RESET,
     SIM_RESET,
+    PATIENT.reset,
     SA_RESET,
     SA_CONTEXT,
     SA_TARGET,
@@ -369,6 +306,8 @@ QUERIES: tuple[Query[Any, Any], ...] = (
 )
 
 SERVICES: tuple[str, ...] = ("sim", "sa", "planner", "motion", "recorder")
+GUESTS: tuple[str, ...] = ("patient", "arms")
+"""Who is part of some stacks only."""
 TOOLS: tuple[str, ...] = ("replay", "supervisor", "monitor")
 """Who publishes and serves queries, too, but is no part of a stack: none waits for them."""
 

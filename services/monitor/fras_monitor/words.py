@@ -8,6 +8,7 @@ ARMS: Final = {"psm1": "right instrument", "psm2": "left instrument"}
 
 SERVICES: Final = {
     "sim": "tissue model",
+    "patient": "patient",
     "sa": "force and visibility watch",
     "planner": "planner",
     "motion": "arm control",

@@ -15,6 +15,7 @@ from fras_common.topics import (
     HOLD,
     HOLDS,
     MOTION_RESET,
+    PATIENT,
     RESUME,
     ROBOT_STATE,
     TISSUE_STATE,
@@ -121,7 +122,7 @@ def _left(status: m.TaskStatus) -> Recalling:
     state: m.RobotState | None = yield Last(ROBOT_STATE)
     if state is None or state.trial != status.trial:
         raise NoStandpoint(f"no robot state of trial {status.trial!r} is remembered")
-    for topic in (TISSUE_STATE, VERDICT):
+    for topic in (TISSUE_STATE, PATIENT.state, VERDICT):
         answer: m.Header | None = yield Last(topic)
         if answer is not None and answer.trial == status.trial and answer.tick > state.tick:
             raise NoStandpoint(

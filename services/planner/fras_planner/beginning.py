@@ -5,8 +5,8 @@ from typing import Any
 
 from fras_common.codec import content_digest
 from fras_common.messages import OpenRequest, ResetReply, ResetRequest, TaskRequest
-from fras_common.scenario import Scenario
-from fras_common.topics import MOTION_RESET, SA_RESET, SIM_RESET
+from fras_common.scenario import Scenario, patient_scenario
+from fras_common.topics import MOTION_RESET, PATIENT, SA_RESET, SIM_RESET
 from fras_planner.effects import Ask
 from fras_planner.endings import DigestMismatch
 
@@ -25,11 +25,24 @@ def log_request(request: TaskRequest, scenario: Scenario, rules: Mapping[str, st
 
 
 def reset_all(request: TaskRequest, scenario: Scenario) -> Generator[Ask, Any, None]:
-    """Reset motion, sim and SA, in this order; raises as `compare` does."""
-    reset = ResetRequest(trial=request.trial, scenario=scenario, mesh=request.mesh)
-    for query in (MOTION_RESET, SIM_RESET, SA_RESET):
+    """Reset motion, sim, the patient where there is one, and SA, in this order.
+
+    The patient's scenario is derived from the trial's; whoever else is reset gets the trial's own.
+
+    Raises
+    ------
+    DigestMismatch
+        See `compare`.
+    ScenarioError
+        No patient can be derived.
+    """
+    derived = patient_scenario(scenario)
+    resets = [(MOTION_RESET, scenario), (SIM_RESET, scenario)]
+    resets += [(PATIENT.reset, derived)] if derived is not None else []
+    for query, own in (*resets, (SA_RESET, scenario)):
+        reset = ResetRequest(trial=request.trial, scenario=own, mesh=request.mesh)
         reply: ResetReply = yield Ask(query, reset, RESET_TIMEOUT_S)
-        compare(request, scenario, reply, query.server)
+        compare(request, own, reply, query.server)
 
 
 def compare(request: TaskRequest, scenario: Scenario, reply: ResetReply, service: str) -> None:

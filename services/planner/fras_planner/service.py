@@ -22,6 +22,7 @@ from fras_common.service.recall import Recall
 from fras_common.topics import (
     ACTION_RESULT,
     APPROVE,
+    PATIENT,
     PLAN,
     RECORDER_OPEN,
     RECORDER_STATUS,
@@ -41,6 +42,10 @@ from fras_planner.requests import REOPEN_TIMEOUT_S
 from fras_planner.resumption import TakenUp, take_up
 
 WATCH_S = 0.5
+NO_PATIENT = (
+    "the scenario has a [patient], and no process `patient` is in this cell: start the stack with "
+    "`fras up --compose twin`, or leave the section out"
+)
 
 
 class PlannerService:
@@ -82,6 +87,8 @@ class PlannerService:
             pending.reply(TaskReply(accepted=False, reason=f"trial {running} is under way"))
         elif request.scenario is None or request.scenario.scene is None:
             pending.reply(TaskReply(accepted=False, reason="start needs a resolved scenario"))
+        elif request.scenario.has_patient and not self._host.present(f"alive/{PATIENT.service}"):
+            pending.reply(TaskReply(accepted=False, reason=NO_PATIENT))
         else:
             self._recall.give_up()
             self._starter = pending

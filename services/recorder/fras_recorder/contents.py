@@ -16,7 +16,7 @@ from fras_common.scenario import to_toml
 from fras_common.service.build import build_of_this_process
 from fras_log import AuditLog, LogHeading, Signer, take_up
 from fras_log.attachments import RULES
-from fras_recorder.completeness import Completeness
+from fras_recorder.completeness import PER_TICK, WITH_PATIENT, Completeness
 from fras_recorder.writing import Opened, Trial
 
 LOG_NAME = "audit.mcap"
@@ -140,7 +140,8 @@ def open_log(
     NoSuchLog, NotAnMcap, ForeignLog
         What is there of the log can't be read.
     """
-    seen = Completeness(request.trial)
+    per_tick = WITH_PATIENT if request.scenario.has_patient else PER_TICK
+    seen = Completeness(request.trial, per_tick=per_tick)
 
     def note(key: str, header: HeaderFields) -> None:
         seen.note(key, header.trial, header.tick, header.seq)

@@ -17,6 +17,7 @@ from fras_sa.awareness import (
     RobotView,
     TissueModel,
     TissueView,
+    believed_where_seen,
 )
 
 
@@ -36,8 +37,12 @@ def model_of(model: m.TissueModel) -> TissueModel:
     )
 
 
-def tissue_of(state: m.TissueState) -> TissueView:
-    """Read the tissue at one tick."""
+def tissue_of(believed: m.TissueState, seen: m.TissueState) -> TissueView:
+    """Read the tissue at one tick: what it bears by its model, and where it is seen to be."""
+    return believed_where_seen(_view_of(believed), _view_of(seen))
+
+
+def _view_of(state: m.TissueState) -> TissueView:
     return TissueView(
         tick=state.tick,
         nodes_m=state.nodes_m.floats(),
@@ -62,12 +67,12 @@ def robot_of(state: m.RobotState) -> RobotView:
 
 
 def verdict_of(
-    judgement: Judgement, parameters: AwarenessParameters, state: m.TissueState
+    judgement: Judgement, parameters: AwarenessParameters, seen: m.TissueState
 ) -> m.Verdict:
     """Put a judgement on the wire; what is no number is told as an impossible one."""
     return m.Verdict(
-        tick=state.tick,
-        trial=state.trial,
+        tick=seen.tick,
+        trial=seen.trial,
         level=judgement.level,
         ok=judgement.ok,
         reason=judgement.reason,
@@ -79,8 +84,8 @@ def verdict_of(
         max_height=list(judgement.max_height),
         force_rate_n_s=judgement.rate_n_s,
         crossing_tick=judgement.crossing_tick,
-        max_node_speed_m_s=_finite(state.max_node_speed_m_s),
-        grasped={arm: len(nodes) for arm, nodes in state.grasped.items()},
+        max_node_speed_m_s=_finite(seen.max_node_speed_m_s),
+        grasped={arm: len(nodes) for arm, nodes in seen.grasped.items()},
     )
 
 

@@ -11,25 +11,39 @@ AHEAD = 1000
 
 @dataclass(frozen=True)
 class Moment:
-    """The two states of one tick."""
+    """The states of one tick.
+
+    Attributes
+    ----------
+    tissue : TissueState
+        By the model: what the tissue bears.
+    robot : RobotState
+    seen : TissueState
+        Of the patient, where there is one besides the model: where the tissue is.
+    """
 
     tissue: TissueState
     robot: RobotState
+    seen: TissueState
 
 
 class TickJoin:
-    """Hands out each tick once, in order, as soon as both of its states are there.
+    """Hands out each tick once, in order, as soon as all of its states are there.
 
     Parameters
     ----------
     first : int
         The tick to begin with.
+    has_patient : bool
+        Whether a tick is complete only with the patient's state.
     """
 
-    def __init__(self, first: int = 0) -> None:
+    def __init__(self, first: int = 0, *, has_patient: bool = False) -> None:
         self._next = first
+        self._has_patient = has_patient
         self._tissues: dict[int, TissueState] = {}
         self._robots: dict[int, RobotState] = {}
+        self._seen: dict[int, TissueState] = {}
 
     def add(self, state: TissueState | RobotState) -> None:
         """Keep the first state of a tick until the tick is complete.
@@ -40,19 +54,32 @@ class TickJoin:
         ------
         TooFarAhead
         """
-        if state.tick < self._next:
+        if not self._is_due(state):
             return
-        if state.tick >= self._next + AHEAD:
-            raise TooFarAhead(state.tick, self._next)
         if isinstance(state, TissueState):
             self._tissues.setdefault(state.tick, state)
         else:
             self._robots.setdefault(state.tick, state)
 
+    def add_seen(self, state: TissueState) -> None:
+        """Do the same with a state of the patient; one that is not waited for is dropped.
+
+        Raises
+        ------
+        TooFarAhead
+        """
+        if self._has_patient and self._is_due(state):
+            self._seen.setdefault(state.tick, state)
+
+    def _is_due(self, state: TissueState | RobotState) -> bool:
+        if state.tick >= self._next + AHEAD:
+            raise TooFarAhead(state.tick, self._next)
+        return state.tick >= self._next
+
     @property
     def is_empty(self) -> bool:
         """Whether no state waits for anything."""
-        return not (self._tissues or self._robots)
+        return not (self._tissues or self._robots or self._seen)
 
     @property
     def missing(self) -> str:
@@ -61,12 +88,17 @@ class TickJoin:
             return ""
         if self._next not in self._robots:
             return "motion"
-        return "" if self._next in self._tissues else "sim"
+        if self._next not in self._tissues:
+            return "sim"
+        return "patient" if self._has_patient and self._next not in self._seen else ""
 
     def take(self) -> Moment | None:
         """Take the next tick, or None while it is incomplete."""
         tick = self._next
         if tick not in self._tissues or tick not in self._robots:
             return None
+        if self._has_patient and tick not in self._seen:
+            return None
         self._next += 1
-        return Moment(self._tissues.pop(tick), self._robots.pop(tick))
+        tissue = self._tissues.pop(tick)
+        return Moment(tissue, self._robots.pop(tick), self._seen.pop(tick, tissue))

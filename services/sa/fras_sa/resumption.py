@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from fras_common import messages as m
 from fras_common.service.recall import Asked, Last, Recalling, Since, reset_under_way
-from fras_common.topics import ROBOT_STATE, SA_RESET, TISSUE_MODEL, TISSUE_STATE, VERDICT
+from fras_common.topics import PATIENT, ROBOT_STATE, SA_RESET, TISSUE_MODEL, TISSUE_STATE, VERDICT
 from fras_sa.trial import WatchedTrial
 
 
@@ -38,6 +38,9 @@ def take_up() -> Recalling:
     since = verdict.tick if verdict is not None else 0
     tissues: list[m.TissueState] = yield Since(TISSUE_STATE, since)
     robots: list[m.RobotState] = yield Since(ROBOT_STATE, since)
+    patients: list[m.TissueState] = []
+    if asked.request.scenario.has_patient:
+        patients = yield Since(PATIENT.state, since)
     trial = WatchedTrial(asked.request.scenario)
     if model is not None and model.trial == name:
         trial.see_model(model)
@@ -45,5 +48,6 @@ def take_up() -> Recalling:
         verdict,
         [one for one in tissues if one.trial == name],
         [one for one in robots if one.trial == name],
+        [one for one in patients if one.trial == name],
     )
     return TakenUp(asked, trial, verdicts)

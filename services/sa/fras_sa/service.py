@@ -11,6 +11,7 @@ from fras_common.service import Deferred, ServiceHost
 from fras_common.service.recall import Recall
 from fras_common.topics import (
     CONTEXT,
+    PATIENT,
     ROBOT_STATE,
     SA_CONTEXT,
     SA_RESET,
@@ -50,6 +51,8 @@ class AwarenessService:
         self._context = host.publisher(CONTEXT)
         host.subscribe(TISSUE_MODEL, self._on_model)
         host.subscribe(TISSUE_STATE, self._on_tissue)
+        # Part of some stacks only; a trial that has one waits for it tick by tick.
+        host.subscribe(PATIENT.state, self._on_patient, required=False)
         host.subscribe(ROBOT_STATE, self._on_robot)
         host.serve(SA_RESET, self._reset)
         host.serve_deferred(SA_TARGET, self._on_target_request)
@@ -95,6 +98,10 @@ class AwarenessService:
 
     def _on_tissue(self, state: m.TissueState) -> None:
         self._trial.see_state(state)
+        self._judge_next()
+
+    def _on_patient(self, state: m.TissueState) -> None:
+        self._trial.see_patient(state)
         self._judge_next()
 
     def _on_robot(self, state: m.RobotState) -> None:

@@ -1,6 +1,7 @@
 """One trial as situation awareness sees it: messages in, messages out, no bus."""
 
 from collections.abc import Sequence
+from typing import TypeVar
 
 from fras_common import messages as m
 from fras_common.scenario import Scenario
@@ -17,6 +18,8 @@ from fras_sa.awareness import Awareness, AwarenessError, Memory, Trend
 from fras_sa.errors import LostMoment, NothingKnown
 from fras_sa.join import Moment, TickJoin
 
+H = TypeVar("H", bound=m.Header)
+
 
 class WatchedTrial:
     """What is known of one trial.
@@ -24,10 +27,12 @@ class WatchedTrial:
     Parameters
     ----------
     scenario : Scenario
-        For its thresholds.
+        For its thresholds, and whether the tissue that is seen is another one than its model.
 
     Attributes
     ----------
+    has_patient : bool
+        Whether a tick is judged only with the patient's state.
     verdict : Verdict or None
         The last one.
     problem : AwarenessError or None
@@ -38,7 +43,8 @@ class WatchedTrial:
         self._parameters = parameters_of(scenario.awareness)
         self._awareness: Awareness | None = None
         self._memory = Memory()
-        self._join = TickJoin()
+        self.has_patient = scenario.has_patient
+        self._join = TickJoin(has_patient=self.has_patient)
         self._now: Moment | None = None
         self.verdict: m.Verdict | None = None
         self.problem: AwarenessError | None = None
@@ -82,16 +88,25 @@ class WatchedTrial:
         """
         self._join.add(state)
 
+    def see_patient(self, state: m.TissueState) -> None:
+        """Take a state of the patient; nothing where the trial has none.
+
+        Raises
+        ------
+        TooFarAhead
+        """
+        self._join.add_seen(state)
+
     def judge_next(self) -> m.Verdict | None:
-        """Judge the next tick as soon as both of its states and the model are here."""
+        """Judge the next tick as soon as all of its states and the model are here."""
         if self._awareness is None or (moment := self._join.take()) is None:
             return None
         judgement = self._awareness.judge(
-            tissue_of(moment.tissue), robot_of(moment.robot), self._memory
+            tissue_of(moment.tissue, moment.seen), robot_of(moment.robot), self._memory
         )
         self._memory = judgement.memory
         self._now = moment
-        self.verdict = verdict_of(judgement, self._parameters, moment.tissue)
+        self.verdict = verdict_of(judgement, self._parameters, moment.seen)
         return self.verdict
 
     def resume(
@@ -99,6 +114,7 @@ class WatchedTrial:
         verdict: m.Verdict | None,
         tissues: Sequence[m.TissueState],
         robots: Sequence[m.RobotState],
+        patients: Sequence[m.TissueState] = (),
     ) -> list[m.Verdict]:
         """Come to where the one before was; the scene has been taken.
 
@@ -106,8 +122,8 @@ class WatchedTrial:
         ----------
         verdict : Verdict or None
             The last one; None before the first.
-        tissues, robots : sequence of TissueState, RobotState
-            From its tick on, or from 0 on.
+        tissues, robots, patients : sequence of TissueState, RobotState, TissueState
+            From its tick on, or from 0 on; of the patient where there is one.
 
         Returns
         -------
@@ -121,20 +137,22 @@ class WatchedTrial:
         """
         said: list[m.Verdict] = []
         if verdict is not None:
-            tissue = next((one for one in tissues if one.tick == verdict.tick), None)
-            robot = next((one for one in robots if one.tick == verdict.tick), None)
-            if tissue is None or robot is None:
+            tissue, robot = _of_tick(verdict.tick, tissues), _of_tick(verdict.tick, robots)
+            seen = _of_tick(verdict.tick, patients) if self.has_patient else tissue
+            if tissue is None or robot is None or seen is None:
                 raise LostMoment(verdict.tick)
             trend = Trend.restored(
                 verdict.tick, verdict.level, verdict.max_force_n, verdict.force_rate_n_s
             )
             self._memory = Memory.restored(verdict.max_height, robot_of(robot).action, trend)
-            self._now = Moment(tissue, robot)
-            self._join = TickJoin(verdict.tick + 1)
+            self._now = Moment(tissue, robot, seen)
+            self._join = TickJoin(verdict.tick + 1, has_patient=self.has_patient)
             self.verdict = verdict
             said.append(verdict)
         for state in (*tissues, *robots):
             self._join.add(state)
+        for state in patients:
+            self._join.add_seen(state)
         while (one := self.judge_next()) is not None:
             said.append(one)
         return said
@@ -149,7 +167,7 @@ class WatchedTrial:
         if self.problem is not None:
             raise self.problem
         awareness, now = self._known()
-        tissue, robot = tissue_of(now.tissue), robot_of(now.robot)
+        tissue, robot = tissue_of(now.tissue, now.seen), robot_of(now.robot)
         view = awareness.context(tissue, robot, self._memory, request.expected)
         return context_of(view, now.tissue, request.request_id)
 
@@ -161,7 +179,7 @@ class WatchedTrial:
         AwarenessError, NothingKnown
         """
         awareness, now = self._known()
-        tissue, robot = tissue_of(now.tissue), robot_of(now.robot)
+        tissue, robot = tissue_of(now.tissue, now.seen), robot_of(now.robot)
         return target_of(
             awareness.target(
                 tissue, robot, action=request.action, arm=request.arm, block=request.block
@@ -172,3 +190,7 @@ class WatchedTrial:
         if self._awareness is None or self._now is None:
             raise NothingKnown("no state of this trial has been seen yet: reset and tick first")
         return self._awareness, self._now
+
+
+def _of_tick(tick: int, states: Sequence[H]) -> H | None:
+    return next((one for one in states if one.tick == tick), None)

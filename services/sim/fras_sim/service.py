@@ -6,29 +6,38 @@ from fras_common.codec import content_digest
 from fras_common.messages import ResetReply, ResetRequest, RobotState
 from fras_common.scenario import check
 from fras_common.service import ServiceHost
+from fras_common.service.gate import TrialGate
 from fras_common.service.recall import Recall
-from fras_common.topics import ROBOT_STATE, SIM_CHECKPOINT, SIM_RESET, TISSUE_MODEL, TISSUE_STATE
+from fras_common.topics import PATIENT, ROBOT_STATE, TWIN, TissueTopics
 from fras_sim.fem import compile_kernels
 from fras_sim.resumption import TakenUp, new_trial, take_up
 from fras_sim.trial import Step, TissueTrial
 
 
 class SimService:
-    """Follows the robot tick by tick; logical time, no clock of its own."""
+    """Follows the robot tick by tick; logical time, no clock of its own.
 
-    def __init__(self, host: ServiceHost) -> None:
+    Parameters
+    ----------
+    host : ServiceHost
+    topics : TissueTopics
+        Where it speaks: as the model of the tissue, or as the patient.
+    """
+
+    def __init__(self, host: ServiceHost, topics: TissueTopics = TWIN) -> None:
         self._host = host
+        self._topics = topics
         self._trial: TissueTrial | None = None
         self._request: ResetRequest | None = None
         began_s = time.perf_counter()
         compile_kernels()
         host.log.info("kernels loaded", took_s=round(time.perf_counter() - began_s, 3))
-        self._model = host.publisher(TISSUE_MODEL)
-        self._state = host.publisher(TISSUE_STATE)
-        self._checkpoint = host.publisher(SIM_CHECKPOINT)
+        self._model = host.publisher(topics.model)
+        self._state = host.publisher(topics.state)
+        self._checkpoint = host.publisher(topics.checkpoint)
         host.subscribe(ROBOT_STATE, self._on_robot)
-        host.serve(SIM_RESET, self._reset)
-        self._recall = Recall(host, take_up(), self._take_up)
+        host.serve(topics.reset, self._reset)
+        self._recall = Recall(host, take_up(topics), self._take_up)
 
     def _reset(self, request: ResetRequest) -> ResetReply:
         check(request.scenario)
@@ -50,7 +59,7 @@ class SimService:
             return
         self._begin(taken.asked.request, taken.trial)
         # This process speaks for what the one before it was told.
-        self._host.publish_mirror(SIM_RESET, taken.asked.record)
+        self._host.publish_mirror(self._topics.reset, taken.asked.record)
         for step in taken.steps:
             self._publish(step)
         name, tick = taken.asked.request.trial, taken.trial.tick
@@ -96,3 +105,12 @@ class SimService:
 
     def close(self) -> None:
         """Nothing to put in order."""
+
+
+def patient_service(host: ServiceHost) -> SimService:
+    """Make the simulator that plays the patient.
+
+    A trial may have none: what is said of it is then nobody's fault, and only counted.
+    """
+    host.gate = TrialGate()
+    return SimService(host, PATIENT)

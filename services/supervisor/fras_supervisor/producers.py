@@ -7,7 +7,11 @@ from typing import Final, Protocol
 from fras_common.topics import TOPICS
 from fras_supervisor.errors import TableError
 
-_MODULES: Final = {"fras_common.router": "router", "fras_motion.arms_main": "arms"}
+_MODULES: Final = {
+    "fras_common.router": "router",
+    "fras_motion.arms_main": "arms",
+    "fras_sim.patient_main": "patient",
+}
 
 
 class Commanded(Protocol):

@@ -11,6 +11,7 @@ services_app = typer.Typer()
 _MODULES = {
     "router": ("router", "fras_common.router"),
     "arms": ("motion", "fras_motion.arms_main"),
+    "patient": ("sim", "fras_sim.patient_main"),
 }
 
 
@@ -36,6 +37,7 @@ def _service(name: str, help_text: str) -> None:
 for _name, _help in {
     "router": "Run a Zenoh router.",
     "sim": "Run the tissue simulator.",
+    "patient": "Run the tissue simulator as the patient, beside the model of it.",
     "sa": "Run situation awareness.",
     "planner": "Run the planner and its executive.",
     "motion": "Run motion.",

@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 import msgspec
 
 from fras_cli.report.trial import (
+    PatientTick,
     RobotTick,
     ServiceFacts,
     TissueTick,
@@ -69,6 +70,7 @@ class Gathering:
         self._robot: dict[int, RobotTick] = {}
         self._tissue: dict[int, TissueTick] = {}
         self._verdicts: dict[int, Verdict] = {}
+        self._patient: dict[int, PatientTick] = {}
         self._views: TissueViews | None = None
         self._top_m = -math.inf
         self._contexts: list[Context] = []
@@ -133,6 +135,7 @@ class Gathering:
             malformed=self._malformed,
             services=dict(sorted(self._services.items())),
             warnings=tuple(self._warnings),
+            patient=_by_tick(self._patient),
         )
 
     def _understand(self, message: RawMessage, kind: type[Header], header: HeaderFields) -> None:
@@ -145,7 +148,9 @@ class Gathering:
         self._last_ns = max(header.stamp_ns, self._last_ns)
         if message.key == topics.TASK.mirror:
             self._on_task(decode(Mirror, message.payload, message.key))
-        elif kind in self._handlers:
+        elif message.key == topics.PATIENT.state.key:
+            self._on_patient(decode(TissueState, message.payload, message.key))
+        elif message.key != topics.PATIENT.model.key and kind in self._handlers:
             self._handlers[kind](decode(kind, message.payload, message.key))
 
     def _count_gap(self, key: str, header: HeaderFields) -> None:
@@ -199,6 +204,14 @@ class Gathering:
             iterations=state.solver.iterations,
             wall_s=state.solver.wall_s,
             converged=state.solver.converged,
+        )
+
+    def _on_patient(self, state: TissueState) -> None:
+        tool_n = (math.hypot(*force) for force in state.tool_force_n.values())
+        self._patient[state.tick] = PatientTick(
+            tick=state.tick,
+            max_force_n=state.max_force_n,
+            tool_force_n=max(tool_n, default=0.0),
         )
 
     def _on_verdict(self, verdict: Verdict) -> None:

@@ -6,6 +6,7 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
+from msgspec import UnsetType
 
 from fras_cli.report.figures import (
     course_figure,
@@ -99,6 +100,12 @@ def _figures(trial: Trial, stories: tuple[PlanStory, ...]) -> list[FigureBlock]:
             "Force against its limits, and visibility of the region of interest against what is "
             "needed. Bands: actions. Dotted: re-plans; simulated time stands still meanwhile."
         )
+        if trial.patient:
+            caption += (
+                " Dark: the force that the model says, by which the trial goes. Violet: what the "
+                "patient bears in truth, filled where that is above the limit and the model says "
+                "that it is not. The pictures of the tissue show the model."
+            )
         blocks.append(FigureBlock(Markup(to_svg(course_figure(trial, stories), "course")), caption))
     if stories:
         caption = "The plans, one a row, with what became of their actions."
@@ -121,6 +128,7 @@ def _numbers(trial: Trial, summary: Summary) -> list[tuple[str, str]]:
         ("Visibility", f"{_or(summary.visibility, '.1%')} (needed: more than {needed:.0%})"),
         ("Largest force", f"{_or(summary.max_force_n, '.3f', ' N')} (limit {summary.limit_n:g} N)"),
         ("Ticks above the limit", f"{summary.ticks_above_limit} of {summary.ticks}"),
+        *_patient_rows(summary),
         ("Safety specifications", specifications_in_words(summary)),
         ("Plans", f"{summary.plans}, of them {summary.replans} re-plans"),
         ("Simulated time", f"{summary.sim_s:.2f} s"),
@@ -137,6 +145,20 @@ def _numbers(trial: Trial, summary: Summary) -> list[tuple[str, str]]:
     if trial.malformed:
         rows.append(("Malformed messages", str(trial.malformed)))
     return rows
+
+
+def _patient_rows(summary: Summary) -> list[tuple[str, str]]:
+    patient = summary.patient
+    if isinstance(patient, UnsetType):
+        return []
+    return [
+        ("Largest force that the patient bore", f"{patient.max_force_n:.3f} N"),
+        (
+            "Its ticks above the limit",
+            f"{patient.ticks_above_limit}, missed by the model {patient.missed}, "
+            f"needless alarms {patient.needless}",
+        ),
+    ]
 
 
 def _signed_by(trial: Trial) -> str:

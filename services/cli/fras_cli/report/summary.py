@@ -5,6 +5,7 @@ from collections.abc import Iterable
 
 import msgspec
 import numpy as np
+from msgspec import UNSET, UnsetType
 
 from fras_cli.report.trial import Trial
 
@@ -16,6 +17,30 @@ class Percentiles(msgspec.Struct, frozen=True, kw_only=True):
 
     p50: float
     p99: float
+
+
+class PatientSummary(msgspec.Struct, frozen=True, kw_only=True):
+    """What the patient bore in truth, beside what its model said; by the scenario's metric.
+
+    Attributes
+    ----------
+    max_force_n : float
+        Over the trial [N].
+    believed_max_force_n : float or None
+        What the model said it was [N].
+    ticks_above_limit : int
+        Ticks in which it bore more than the soft limit.
+    missed : int
+        Those of them in which the model said that it did not.
+    needless : int
+        Ticks in which the model said so, and it did not.
+    """
+
+    max_force_n: float
+    believed_max_force_n: float | None
+    ticks_above_limit: int
+    missed: int
+    needless: int
 
 
 class Summary(msgspec.Struct, frozen=True, kw_only=True):
@@ -53,6 +78,8 @@ class Summary(msgspec.Struct, frozen=True, kw_only=True):
     complete : bool
         Whether the file is whole; else the numbers hold for what came before the cut.
     versions : dict of str to str
+    patient : PatientSummary, optional
+        Left out where the trial has no patient besides its model.
     """
 
     outcome: str
@@ -79,6 +106,7 @@ class Summary(msgspec.Struct, frozen=True, kw_only=True):
     head: str
     complete: bool
     versions: dict[str, str]
+    patient: PatientSummary | UnsetType = UNSET
 
 
 def summarise(trial: Trial) -> Summary:
@@ -116,12 +144,29 @@ def summarise(trial: Trial) -> Summary:
         head=trial.metadata.get("head", ""),
         complete=trial.complete,
         versions=_versions(trial),
+        patient=_patient(trial, max(forces, default=None)),
     )
 
 
 def to_json(summary: Summary) -> bytes:
     """Encode as indented JSON with a final newline."""
     return msgspec.json.format(msgspec.json.encode(summary), indent=2) + b"\n"
+
+
+def _patient(trial: Trial, believed_max_n: float | None) -> PatientSummary | UnsetType:
+    """Hold what the patient bore against what was believed in the same tick."""
+    if not trial.patient:
+        return UNSET
+    limit_n = trial.scenario.awareness.force_limit_n
+    believed_n = {verdict.tick: verdict.max_force_n for verdict in trial.verdicts}
+    both = [(force_n, believed_n[tick]) for tick, force_n in trial.borne if tick in believed_n]
+    return PatientSummary(
+        max_force_n=max(force_n for _, force_n in trial.borne),
+        believed_max_force_n=believed_max_n,
+        ticks_above_limit=sum(force_n > limit_n for _, force_n in trial.borne),
+        missed=sum(force_n > limit_n >= said_n >= 0 for force_n, said_n in both),
+        needless=sum(said_n > limit_n >= force_n for force_n, said_n in both),
+    )
 
 
 def _startup_s(trial: Trial) -> float | None:

@@ -64,6 +64,24 @@ class TissueTick:
 
 
 @dataclass(frozen=True)
+class PatientTick:
+    """What the patient bore in truth at one tick.
+
+    Parameters
+    ----------
+    tick : int
+    max_force_n : float
+        Largest nodal force [N].
+    tool_force_n : float
+        Largest force of an instrument on it [N].
+    """
+
+    tick: int
+    max_force_n: float
+    tool_force_n: float
+
+
+@dataclass(frozen=True)
 class TissueViews:
     """Whole states of the tissue that are worth a picture."""
 
@@ -109,6 +127,8 @@ class Trial:
     services : mapping of service to ServiceFacts
     warnings : tuple of str
         What the services logged from WARNING up.
+    patient : tuple of PatientTick
+        One entry a tick; empty where the trial has no patient besides its model.
     """
 
     path: str
@@ -133,6 +153,7 @@ class Trial:
     malformed: int
     services: Mapping[str, ServiceFacts]
     warnings: tuple[str, ...]
+    patient: tuple[PatientTick, ...] = ()
 
     @property
     def dt_s(self) -> float:
@@ -143,6 +164,14 @@ class Trial:
     def ending(self) -> TaskStatus | None:
         """The status that names the outcome, or None where the log ends before."""
         return next((status for status in reversed(self.statuses) if status.outcome), None)
+
+    @property
+    def borne(self) -> tuple[tuple[int, float], ...]:
+        """Tick and force of the patient [N], by the scenario's metric."""
+        is_tool = self.scenario.awareness.force_metric == "tool"
+        return tuple(
+            (one.tick, one.tool_force_n if is_tool else one.max_force_n) for one in self.patient
+        )
 
     def robot_at(self, tick: int) -> RobotTick | None:
         """Return the robot at `tick`, or None where its state was not recorded."""

@@ -1,5 +1,7 @@
 """Names and reasons of the messages in plain words, for people who did not write them."""
 
+from msgspec import UnsetType
+
 from fras_cli.report.story import ActionStory, PlanStory
 from fras_cli.report.summary import CUT_SHORT, Summary
 
@@ -50,8 +52,32 @@ def details_in_words(summary: Summary, needed_fraction: float) -> list[str]:
             f"The largest force was {summary.max_force_n:.2f} N, the limit is "
             f"{summary.limit_n:.2f} N{crossed}."
         )
+    sentences += patient_in_words(summary)
     done = _count(len(summary.actions), "action")
     sentences.append(f"{done} in {summary.sim_s:.1f} s, {_count(summary.replans, 're-plan')}.")
+    return sentences
+
+
+def patient_in_words(summary: Summary) -> list[str]:
+    """Say what the patient bore in truth; nothing where there is none besides its model."""
+    patient = summary.patient
+    if isinstance(patient, UnsetType):
+        return []
+    believed_n = patient.believed_max_force_n
+    said = f", where its model said {believed_n:.2f} N" if believed_n is not None else ""
+    sentences = [f"The patient bore {patient.max_force_n:.2f} N at most{said}."]
+    if patient.ticks_above_limit:
+        missed = (
+            f"the model missed {patient.missed} of them"
+            if patient.missed
+            else "the model missed none"
+        )
+        above = _count(patient.ticks_above_limit, "tick")
+        sentences.append(f"It bore more than the limit for {above}; {missed}.")
+    if patient.needless:
+        sentences.append(
+            f"For {_count(patient.needless, 'tick')} the model said so, and it did not."
+        )
     return sentences
 
 

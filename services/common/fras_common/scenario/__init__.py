@@ -3,7 +3,8 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from fras_common.scenario.loader import ScenarioError, check, load, to_toml
+from fras_common.scenario.errors import ScenarioError
+from fras_common.scenario.loader import check, load, to_toml
 from fras_common.scenario.mesh import MeshFacts, fit_to_mesh
 from fras_common.scenario.model import (
     AwarenessSection,
@@ -11,12 +12,14 @@ from fras_common.scenario.model import (
     Disc,
     GeneratorSection,
     MotionSection,
+    PatientSection,
     PlannerSection,
     RunSection,
     Scenario,
     SceneSection,
     TissueSection,
 )
+from fras_common.scenario.patient import patient_scenario
 
 if TYPE_CHECKING:
     from fras_common.scenario.generator import draw_scene, resolve
@@ -29,6 +32,7 @@ __all__ = [
     "GeneratorSection",
     "MeshFacts",
     "MotionSection",
+    "PatientSection",
     "PlannerSection",
     "RunSection",
     "Scenario",
@@ -41,6 +45,7 @@ __all__ = [
     "fit_to_mesh",
     "load",
     "nodes_in_discs",
+    "patient_scenario",
     "resolve",
     "to_toml",
 ]

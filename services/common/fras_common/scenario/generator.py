@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from fras_common.errors import FrasError
 from fras_common.scenario.geometry import bottom_raster, covered
 from fras_common.scenario.model import Disc, Scenario, SceneSection
+from fras_common.scenario.patient import patient_scenario
 
 ROI_DRAWS: Final = 2000
 MAX_REDRAWS: Final = 1000
@@ -25,10 +26,18 @@ def resolve(scenario: Scenario) -> Scenario:
     -------
     Scenario
         The same scenario with `scene` present; what services receive and logs keep.
+
+    Raises
+    ------
+    NoRoomForRoi
+        See `draw_scene`.
+    ScenarioError
+        No patient can be derived from it.
     """
-    if scenario.scene is not None:
-        return scenario
-    return msgspec.structs.replace(scenario, scene=draw_scene(scenario))
+    if scenario.scene is None:
+        scenario = msgspec.structs.replace(scenario, scene=draw_scene(scenario))
+    patient_scenario(scenario)
+    return scenario
 
 
 def draw_scene(scenario: Scenario) -> SceneSection:

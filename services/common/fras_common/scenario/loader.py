@@ -10,26 +10,14 @@ from typing import Any, cast, get_args
 import msgspec
 import tomlkit
 
-from fras_common.errors import FrasError, shown
 from fras_common.files import TEXT_BYTES, read_at_most
+from fras_common.scenario.errors import ScenarioError
 from fras_common.scenario.limits import breaches
 from fras_common.scenario.model import Scenario, Section
+from fras_common.scenario.patient import patient_scenario
 
 _PATH = re.compile(r" - at `\$\.?(.*)`$")
 _UNKNOWN = re.compile(r"Object contains unknown field `(.*?)`")
-
-
-class ScenarioError(FrasError):
-    """A scenario that can't be run."""
-
-    def __init__(self, file: str, key: str, value: object, allowed: str) -> None:
-        super().__init__(
-            f"{file}: {key} = {shown(value)}: {allowed}",
-            file=file,
-            key=key,
-            value=value,
-            allowed=allowed,
-        )
 
 
 def load(path: Path) -> Scenario:
@@ -69,7 +57,8 @@ def check(scenario: Scenario, file: str = "scenario") -> Scenario:
     ------
     ScenarioError
         ROI outside the tissue, a disc off the tissue, inverted ranges, no room for the ROI that the
-        generator is to draw, an element that the box has not, or a breach of `limits`.
+        generator is to draw, an element that the box has not, a breach of `limits`, or a patient
+        that is no tissue.
     """
     tissue, generator = scenario.tissue, scenario.generator
     if tissue.mesh_file is None:
@@ -91,6 +80,8 @@ def check(scenario: Scenario, file: str = "scenario") -> Scenario:
         )  # fmt: skip
     for key, value, allowed in breaches(scenario):
         raise ScenarioError(file, key, value, allowed)
+    if scenario.scene is not None and tissue.mesh_file is None:
+        patient_scenario(scenario, file)
     return scenario
 
 

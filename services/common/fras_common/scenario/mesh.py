@@ -4,7 +4,8 @@ from typing import Final
 
 import msgspec
 
-from fras_common.scenario.loader import ScenarioError, check_places
+from fras_common.scenario.errors import ScenarioError
+from fras_common.scenario.loader import check_places
 from fras_common.scenario.model import Scenario, TissueSection
 
 # A size that differs from the mesh's by less is the mesh's, written down.

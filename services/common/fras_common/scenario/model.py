@@ -7,7 +7,7 @@ every reset) and the source of the reference page.
 from typing import Annotated, Literal
 
 import msgspec
-from msgspec import Meta
+from msgspec import UNSET, Meta, UnsetType
 
 Force = Annotated[float, Meta(gt=0, le=1e6)]
 Distance = Annotated[float, Meta(ge=0, le=1.0)]
@@ -230,8 +230,34 @@ class RecorderSection(Section, frozen=True, kw_only=True):
     fsync: bool = True
 
 
+class PatientSection(Section, frozen=True, kw_only=True):
+    """How the patient differs from the model of it, the twin; `patient_scenario` derives it.
+
+    Attributes
+    ----------
+    young_modulus_factor, disc_radius_factor : float
+        Of the trial's Young's modulus, and of the radius of each attachment disc.
+    disc_shift_m : float
+        By how much the centre of each disc is moved.
+    seed : int
+        Draws the directions.
+    """
+
+    young_modulus_factor: Annotated[float, Meta(gt=0, le=1000)] = 1.0
+    disc_shift_m: Distance = 0.0
+    disc_radius_factor: Annotated[float, Meta(gt=0, le=100)] = 1.0
+    seed: Annotated[int, Meta(ge=0, lt=2**53)] = 0
+
+
 class Scenario(Section, frozen=True, kw_only=True):
-    """One trial: everything that decides its result, and how fast to run it."""
+    """One trial: everything that decides its result, and how fast to run it.
+
+    Attributes
+    ----------
+    patient : PatientSection, optional
+        Tissue besides its model. Unset, and not None, where there is none: a scenario without it
+        is encoded as before there could be one.
+    """
 
     name: Name = "default"
     seed: Annotated[int, Meta(ge=0, lt=2**53)] = 0
@@ -243,3 +269,9 @@ class Scenario(Section, frozen=True, kw_only=True):
     motion: MotionSection = MotionSection()
     run: RunSection = RunSection()
     recorder: RecorderSection = RecorderSection()
+    patient: PatientSection | UnsetType = UNSET
+
+    @property
+    def has_patient(self) -> bool:
+        """Whether the tissue that is seen is another one than its model."""
+        return not isinstance(self.patient, UnsetType)

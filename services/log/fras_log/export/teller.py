@@ -19,7 +19,7 @@ from fras_common.messages import (
     Verdict,
 )
 from fras_common.scenario import Scenario
-from fras_common.topics import CONTEXT, TISSUE_MODEL, TISSUE_STATE, topic_of
+from fras_common.topics import CONTEXT, PATIENT, TISSUE_MODEL, TISSUE_STATE, topic_of
 from fras_log.anchors import Anchors, FloatArray, bind
 from fras_log.export.facts import (
     Arms,
@@ -101,6 +101,9 @@ class Teller:
             self.malformed += 1
             return []
         if topic is None or header.trial != self._trial or topic.type not in self._handlers:
+            return []
+        if topic.producer == PATIENT.service:
+            # What is drawn is the model, by whose force the trial goes.
             return []
         try:
             content = decode(topic.type, message.payload, message.key)

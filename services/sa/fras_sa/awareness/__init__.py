@@ -12,6 +12,7 @@ from .errors import (
     MalformedModel,
     NoBlocks,
     NoTissueNearRoi,
+    TwoTicks,
     UnknownAtom,
     UnknownName,
     UnusableState,
@@ -30,6 +31,7 @@ from .views import (
     RobotView,
     TissueModel,
     TissueView,
+    believed_where_seen,
 )
 from .visibility import ClosePoints, make_close_points
 
@@ -57,9 +59,11 @@ __all__ = [
     "TissueModel",
     "TissueView",
     "Trend",
+    "TwoTicks",
     "UnknownAtom",
     "UnknownName",
     "UnusableState",
+    "believed_where_seen",
     "make_blocks",
     "make_close_points",
 ]

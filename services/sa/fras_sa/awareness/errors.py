@@ -68,6 +68,17 @@ class UnusableState(AwarenessError):
         )
 
 
+class TwoTicks(AwarenessError):
+    """Where the tissue is at one tick, and what it bears at another."""
+
+    def __init__(self, believed: int, seen: int) -> None:
+        super().__init__(
+            f"a force of tick {believed} with positions of tick {seen}: join them by tick first",
+            believed=believed,
+            seen=seen,
+        )
+
+
 class UnknownAtom(AwarenessError):
     """An expectation about a fluent, arm or block that the scene does not have."""
 

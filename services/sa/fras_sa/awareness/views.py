@@ -11,6 +11,8 @@ from typing import Any, Literal, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from .errors import TwoTicks
+
 FloatArray: TypeAlias = NDArray[np.floating[Any]]
 IndexArray: TypeAlias = NDArray[np.integer[Any]]
 Level: TypeAlias = Literal["ok", "soft", "hard", "invalid"]
@@ -77,6 +79,38 @@ class TissueView:
     tool_force_n: Mapping[str, FloatArray]
     converged: bool
     max_node_speed_m_s: float = 0.0
+
+
+def believed_where_seen(believed: TissueView, seen: TissueView) -> TissueView:
+    """Return the tissue where it is seen to be, with the force that its model bears.
+
+    Parameters
+    ----------
+    believed : TissueView
+        By the model: its forces count.
+    seen : TissueView
+        By whoever sees the tissue: its positions and its speed count.
+
+    Returns
+    -------
+    TissueView
+        It converged where both did. Where both are one it is that one.
+
+    Raises
+    ------
+    TwoTicks
+        They are of two ticks: no force belongs to these positions.
+    """
+    if believed.tick != seen.tick:
+        raise TwoTicks(believed.tick, seen.tick)
+    return TissueView(
+        tick=believed.tick,
+        nodes_m=seen.nodes_m,
+        max_force_n=believed.max_force_n,
+        tool_force_n=believed.tool_force_n,
+        converged=believed.converged and seen.converged,
+        max_node_speed_m_s=seen.max_node_speed_m_s,
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

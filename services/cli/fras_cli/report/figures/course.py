@@ -14,6 +14,7 @@ from fras_cli.report.figures.style import (
     FORCE,
     INK,
     LIMIT,
+    PATIENT,
     VISIBILITY,
     colour_of,
     drawing,
@@ -46,7 +47,8 @@ def draw_force(
     hard_n = 2.0 * soft_n if awareness.hard_limit_n is None else awareness.hard_limit_n
     time_s = np.array([verdict.tick * trial.dt_s for verdict in trial.verdicts])
     force_n = np.array([verdict.max_force_n for verdict in trial.verdicts])
-    peak_n = float(np.nanmax(force_n, initial=0.0)) if force_n.size else 0.0
+    borne_n = np.array([force for _, force in trial.borne])
+    peak_n = float(np.nanmax([*force_n, *borne_n, 0.0]))
     top_n = 1.12 * max(peak_n, hard_n)
     _frame(axes, trial, stories)
     _name_actions(axes, stories, narrow_s=narrow * _end_s(trial))
@@ -59,10 +61,26 @@ def draw_force(
         time_s, force_n, soft_n, where=force_n > soft_n, color=LIMIT, alpha=0.35, lw=0
     )
     axes.plot(time_s, force_n, color=FORCE, lw=1.4, zorder=4)
+    if trial.patient:
+        _draw_patient(axes, trial, soft_n)
     _mark_replans(axes, stories, named=True)
     axes.set_ylim(0.0, top_n)
     metric = "tool force" if awareness.force_metric == "tool" else "largest nodal force"
     axes.set_ylabel(f"{metric} [N]")
+
+
+def _draw_patient(axes: Axes, trial: Trial, soft_n: float) -> None:
+    """Draw what the patient bears in truth, filled where that is above the limit and missed."""
+    believed_n = {verdict.tick: verdict.max_force_n for verdict in trial.verdicts}
+    time_s = np.array([tick * trial.dt_s for tick, _ in trial.borne])
+    borne_n = np.array([force for _, force in trial.borne])
+    missed = np.array(
+        [force > soft_n >= believed_n.get(tick, -1.0) >= 0.0 for tick, force in trial.borne]
+    )
+    axes.fill_between(time_s, borne_n, soft_n, where=missed, color=PATIENT, alpha=0.35, lw=0)
+    axes.plot(time_s, borne_n, color=PATIENT, lw=1.4, zorder=5, label="patient, in truth")
+    axes.plot([], [], color=FORCE, lw=1.4, label="model, believed")
+    axes.legend(loc="upper left", bbox_to_anchor=(0.0, 1.0), fontsize=7.5)
 
 
 def draw_visibility(axes: Axes, trial: Trial, stories: Sequence[PlanStory]) -> None:

@@ -28,6 +28,7 @@ FAINT: Final = "#8b949e"
 LIMIT: Final = palette.LIMIT
 FORCE: Final = "#1f2328"
 VISIBILITY: Final = "#0072b2"
+PATIENT: Final = "#7b3294"
 FORCE_MAP: Final = LinearSegmentedColormap.from_list("force", list(palette.FORCE_STOPS))
 # Of the pixels inside vector figures: sharp on screens that double theirs, and in print.
 RASTER_DPI: Final = 180
