@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.container import ErrorbarContainer
 
 from fras_experiments.results.command import write_report
 from fras_experiments.results.errors import BadResults
@@ -68,11 +69,11 @@ def test_the_figure_has_a_line_for_each_shift(results: Results):
     figure = draw_twin(results, 0)
     assert figure is not None
     left, right = figure.axes
-    labels = [text.get_text() for text in left.get_legend().get_texts()]
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert labels == ["attachments 0 mm off", "attachments 5 mm off"]
     lines = [one for one in right.get_lines() if str(one.get_label()).startswith("attach")]
     assert [list(np.asarray(one.get_ydata())) for one in lines] == [[1.0, 2.0]] * 2
-    bars = [bar.lines[0] for bar in left.containers]
+    bars = [bar.lines[0] for bar in left.containers if isinstance(bar, ErrorbarContainer)]
     assert [list(np.asarray(one.get_ydata())) for one in bars] == [[0.0, 25.0]] * 2
 
 

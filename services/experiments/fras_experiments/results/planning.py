@@ -14,7 +14,6 @@ from fras_experiments.results.statistics import Growth, growth
 
 BLOCKS: Final = "awareness.blocks"
 FRACTION: Final = "generator.attached_fraction"
-IGNORE: Final = "planner.ignore_ap"
 USUAL_FRACTION: Final = "0.4"
 
 Times = dict[int, NDArray[np.float64]]
@@ -58,8 +57,8 @@ class Planning:
     by_fraction : tuple of Cell
         Times of first plans by f and N, f growing.
     move, release : tuple of Cell
-        Times of re-planning, by f and N: the grasp is kept (scenario B, of trials that heed
-        attachments), or released (C, of trials whose first plan ignores them).
+        Times of re-planning, by f and N: the grasp is kept (scenario B) or released (C). A trial
+        that did both is in both.
     """
 
     through_service: bool
@@ -93,16 +92,14 @@ def planning_of(results: Results, *, seed: int) -> Planning | None:
     if not by_size:
         return None
     solver = _by_size(alone, blocks)
-    ignoring = results.settings(IGNORE, "false") == "true"
-    move = np.where(ignoring, np.nan, timing.of(trials, "replan_move_s"))
-    release = np.where(ignoring, timing.of(trials, "replan_release_s"), np.nan)
+    anew = [timing.of(trials, name) for name in ("replan_move_s", "replan_release_s")]
     return Planning(
         through_service,
         by_size,
         growth(by_size, seed=seed),
         solver,
         growth(solver, seed=seed),
-        *(_cells(one, blocks, fractions, seed) for one in (times, move, release)),
+        *(_cells(one, blocks, fractions, seed) for one in (times, *anew)),
     )
 
 

@@ -87,9 +87,10 @@ def _anew(planning: Planning) -> Iterator[str]:
     yield "### Re-planning"
     yield ""
     yield (
-        "B: the first later plan that keeps the grasp, in trials that heed attachments. C: the "
-        "first later plan that releases it, in trials whose first plan ignores them. The paper's "
-        f"are of f = {100 * REPLAN_F:.0f} %, 100 a cell."
+        "B: the first later plan of a trial that keeps the grasp. C: the first that releases it. "
+        "A trial that did both is in both, and all are told alike whether their first plan heeded "
+        "attachments or not: later plans always do. The paper's are of "
+        f"f = {100 * REPLAN_F:.0f} %, 100 a cell."
     )
     yield ""
     for kind, cells, table in (

@@ -57,12 +57,13 @@ def draw_planning(results: Results, seed: int) -> Figure | None:
     width = WIDTH_IN if anew else 0.72 * WIDTH_IN
     with drawing():
         first = _first(planning)
-        height = HEIGHT_IN + LINE_IN * (max(len(first), len(anew)) > 1) * (len(first) + 1)
+        alone = len(first) == 1 and not anew
+        height = HEIGHT_IN + (0.0 if alone else LINE_IN * (1 + max(len(first), len(anew))))
         figure = Figure(figsize=(width, height), layout="constrained")
         panels = figure.subplots(1, 1 + bool(anew), sharey=True, squeeze=False)[0]
-        _draw(panels[0], first, "time to the first plan [ms]", seed)
+        _draw(panels[0], first, "time to the first plan [ms]", seed, alone=alone)
         if anew:
-            _draw(panels[1], anew, "", seed)
+            _draw(panels[1], anew, "", seed, alone=False)
             panels[1].set_ylabel("time to plan anew [ms]")
     return figure
 
@@ -97,9 +98,8 @@ def _lines(
     return found
 
 
-def _draw(axes: Axes, lines: list[_Line], ylabel: str, seed: int) -> None:
+def _draw(axes: Axes, lines: list[_Line], ylabel: str, seed: int, *, alone: bool) -> None:
     sizes = sorted({n for line in lines for n in (*line.times_s, *line.paper_s)})
-    alone = len(lines) == 1
     for place, line in enumerate(lines):
         _draw_ours(axes, line, 1.0 + 0.018 * (place - (len(lines) - 1) / 2), alone, seed)
     for place, line in enumerate(lines):

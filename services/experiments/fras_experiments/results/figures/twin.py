@@ -25,6 +25,7 @@ from fras_experiments.results.reading import Results
 HEIGHT_IN: Final = 3.2
 ASIDE: Final = 0.012
 """Of the next line, as a share of the width."""
+MOST_TICKS: Final = 8
 COLOURS: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 LOOKS: Final = (("o", "-"), ("s", "--"), ("^", "-."), ("D", ":"), ("v", "-"), ("P", "--"))
 
@@ -43,7 +44,7 @@ def draw_twin(results: Results, seed: int) -> Figure | None:
     factors = _numbers(results, STIFFNESS, "1.0")
     shifts = _numbers(results, SHIFT, "0.0")
     lines = np.unique(shifts[chosen])
-    width = float(np.ptp(factors[chosen])) or 1.0
+    width, places = float(np.ptp(factors[chosen])) or 1.0, np.unique(factors[chosen])
     with drawing():
         figure = Figure(figsize=(WIDTH_IN, HEIGHT_IN), layout="constrained")
         left, right = figure.subplots(1, 2)
@@ -57,7 +58,7 @@ def draw_twin(results: Results, seed: int) -> Figure | None:
             }
             aside = ASIDE * width * (place - (lines.size - 1) / 2)
             label = f"attachments {1e3 * shift:g} mm off"
-            _draw_missed(left, points, aside, look, label)
+            _draw_missed(left, points, aside, look)
             _draw_ratio(right, points, aside, look, label, seed)
         left.set_ylim(-3.0, 103.0)
         left.set_ylabel("scenes with a missed limit [%]")
@@ -69,9 +70,12 @@ def draw_twin(results: Results, seed: int) -> Figure | None:
         right.minorticks_off()
         for axes in (left, right):
             axes.set_xlabel("Young's modulus, patient's / model's")
+            if places.size <= MOST_TICKS:
+                axes.set_xticks(places, [f"{factor:g}" for factor in places])
             axes.grid(color=FAINT, alpha=0.25, linewidth=0.5)
             open_frame(axes)
-        left.legend(loc="best", fontsize=7.5)
+        handles, labels = right.get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper left", ncols=3, fontsize=7.5)
     return figure
 
 
@@ -87,9 +91,7 @@ def _numbers(results: Results, path: str, default: str) -> NDArray[np.float64]:
         raise BadResults(f"{results.folder}: {path}: {error}") from error
 
 
-def _draw_missed(
-    axes: Axes, points: dict[float, ModelError], aside: float, look: int, label: str
-) -> None:
+def _draw_missed(axes: Axes, points: dict[float, ModelError], aside: float, look: int) -> None:
     share = np.array([100.0 * one.missed.value for one in points.values()])
     low = np.array([100.0 * one.missed.ci.low for one in points.values()])
     high = np.array([100.0 * one.missed.ci.high for one in points.values()])
@@ -97,7 +99,7 @@ def _draw_missed(
     axes.errorbar(
         np.array(list(points)) + aside, share, yerr=np.abs([share - low, high - share]),
         color=COLOURS[look], marker=mark, linestyle=style, ms=5, linewidth=1.2, capsize=2,
-        elinewidth=0.8, label=label,
+        elinewidth=0.8,
     )  # fmt: skip
 
 
