@@ -29,6 +29,8 @@ class Stacks:
         self.folder = folder
         self.begun: list[str] = []
         self.patients: list[bool] = []
+        # One that has nothing to do, and one that has.
+        self.plans = [SimpleNamespace(actions=actions) for actions in ([], ["reach"])]
         self.ends: list[str] = []
         self.ended: list[str] = []
         self.cannot_start = 0
@@ -63,7 +65,8 @@ class Stacks:
     def follow(
         self, follower: Any, trial: str, given: Any, folder: Path, until: Any, **_: Any
     ) -> bool:
-        self.ends = [until(TrialView()), until(TrialView(plan=SimpleNamespace()))]  # type: ignore[arg-type]
+        views = [TrialView(), *(TrialView(plan=one) for one in self.plans)]  # type: ignore[arg-type]
+        self.ends = [until(view) for view in views]
         (folder / "audit.mcap").write_bytes(b"log of " + trial.encode())
         return self.play(folder)
 
@@ -198,12 +201,16 @@ def test_a_trial_until_its_plan_is_ended_by_it_and_told_as_planned(stacks: Stack
     one = stacks.worker()
     done = one.run(until_plan(0))
     assert outcome(done) == ("planned", "")
-    assert stacks.ends == ["", reason]
+    assert stacks.ends == ["", "", reason]
+    # How far it came in the meantime is chance.
+    assert done.record is not None
+    result = done.record.result
+    assert (result.plans, result.ticks, result.visibility, result.complete) == (1, None, None, True)
     assert not done.files
     assert len(stacks.begun) == 1
     # Another end of it is told as what it is.
     stacks.measured = msgspec.structs.replace(stacks.measured, reason="hold:sim")
     assert outcome(one.run(until_plan(1))) == ("aborted", "hold:sim")
     one.run(task(2))
-    assert stacks.ends == ["", ""]
+    assert stacks.ends == ["", "", ""]
     stacks.end(one)

@@ -176,8 +176,9 @@ def test_a_trial_until_its_plan_ends_there_with_a_patient_and_without(
         plain, twin = csv.DictReader(file)
     for row in (plain, twin):
         assert (row["outcome"], row["complete"], row["plans"]) == ("planned", "true", "1"), row
-    assert plain["patient_max_force_n"] == ""
-    assert twin["patient_max_force_n"] != ""
+        # How far the arms had come is chance, and not told.
+        assert row["ticks"] == row["visibility"] == row["patient_max_force_n"] == "", row
+    assert (plain["patient.young_modulus_factor"], twin["awareness.blocks"]) == ("", "6")
     with (tmp_path / "r" / "timing.csv").open(encoding="utf-8") as file:
         for row in csv.DictReader(file):
             assert float(row["plan_service_s"]) > float(row["plan_first_s"]) > 0.0

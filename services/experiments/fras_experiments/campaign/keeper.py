@@ -23,7 +23,14 @@ from fras_common.errors import FrasError
 from fras_common.scenario import Scenario
 from fras_experiments.campaign.code import code_digest, code_version
 from fras_experiments.campaign.measure import measure, planning_in, series_of
-from fras_experiments.campaign.records import PLANNED, SUCCESS, Record, Timing, without_result
+from fras_experiments.campaign.records import (
+    PLANNED,
+    SUCCESS,
+    Record,
+    Timing,
+    until_plan,
+    without_result,
+)
 from fras_experiments.campaign.spec import Until
 from fras_experiments.following import LOG, follow_to_end, lay_out
 
@@ -187,7 +194,8 @@ class Keeper(WorkerPlugin):
         until_s = time.monotonic() + PATIENCE_S
 
         def why_end(view: TrialView) -> str:
-            if until == "plan" and view.plan is not None:
+            # A plan without actions ends the trial by itself: there is none, or nothing to do.
+            if until == "plan" and view.plan is not None and view.plan.actions:
                 return HAS_PLAN
             return TOO_LONG if time.monotonic() > until_s else ""
 
@@ -277,11 +285,11 @@ def _record(scenario: Scenario, log: Path, died: str, timing: Timing) -> Record:
     except FrasError as error:
         result = without_result(scenario, f"stack: its log can't be read: {error.kind}")
         return Record(code=code_version(), result=result, timing=timing)
-    result = measure(trial)
+    result, series = measure(trial), series_of(trial)
     if (result.outcome, result.reason) == ("aborted", HAS_PLAN):
-        result = msgspec.structs.replace(result, outcome=PLANNED, reason="")
+        result, series = until_plan(scenario, complete=result.complete), ()
     timing = planning_in(trial, timing)
-    return Record(code=code_version(), result=result, timing=timing, series=series_of(trial))
+    return Record(code=code_version(), result=result, timing=timing, series=series)
 
 
 def _packed(folder: Path, logs: Path | None) -> dict[str, bytes]:

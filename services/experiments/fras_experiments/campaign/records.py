@@ -160,3 +160,12 @@ def without_result(scenario: Scenario, reason: str) -> Result:
         roi_x_m=roi_m[0] if roi_m else None,
         roi_y_m=roi_m[1] if roi_m else None,
     )
+
+
+def until_plan(scenario: Scenario, *, complete: bool) -> Result:
+    """Make the result of a trial that was ended with its first plan.
+
+    How far the arms had come by then differs from run to run, and is not told.
+    """
+    bare = without_result(scenario, "")
+    return msgspec.structs.replace(bare, outcome=PLANNED, complete=complete, plans=1)

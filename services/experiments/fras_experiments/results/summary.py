@@ -108,7 +108,7 @@ def _opening(results: Results) -> Iterator[str]:
     cut = int((~trials.complete).sum())
     if cut:
         yield f"- the log of {cut} trials is not whole; their numbers hold up to the cut"
-    unseen = int(np.isnan(trials.visibility).sum())
+    unseen = 0 if trials.planned_only else int(np.isnan(trials.visibility).sum())
     if unseen:
         yield f"- {unseen} trials have no visibility and are missing in its means"
     few = len(trials) < FEW
