@@ -40,7 +40,7 @@ def test_an_empty_file_is_the_default_scenario(written: Any):
     assert scenario.awareness.visible_fraction == 0.7
     assert scenario.awareness.closed_jaw_rad == pytest.approx(math.radians(20))
     assert (scenario.awareness.blocks, scenario.awareness.at_distance_m) == (7, 0.005)
-    assert (scenario.planner.criterion, scenario.planner.goal) == ("weighted", "visible")
+    assert (scenario.planner.criterion, scenario.planner.goal) == ("capped", "visible")
     assert scenario.planner.max_replans == 5
     assert (scenario.motion.free_speed_m_s, scenario.motion.holding_speed_m_s) == (0.05, 0.02)
     assert (scenario.motion.lift_height_m, scenario.motion.retreat_max_m) == (0.05, 0.005)
@@ -83,7 +83,7 @@ def test_an_empty_file_is_the_default_scenario(written: Any):
         ("seed = 9007199254740992", "seed", 2**53, "<= 9007199254740991"),
         ("name = 5", "name", 5, "str"),
         ("[planner]\ncriterion = 'best'", "planner.criterion", "best",
-         "allowed: sum, literal, lex, nearest, weighted"),
+         "allowed: sum, literal, lex, nearest, weighted, capped"),
         ("[planner]\ngoal = ''", "planner.goal", "", "allowed: visible, clear"),
         ("[awareness]\nforce_metric = 'max'", "awareness.force_metric", "max",
          "allowed: nodal_max, tool"),

@@ -19,7 +19,7 @@ def copy(tmp_path: Path) -> Path:
 
 def test_the_checkout_is_found(knowledge: Knowledge) -> None:
     assert {"domain.lp", "explain.lp", "preferences/weighted.lp"} <= set(knowledge.files)
-    assert knowledge.criteria == ("lex", "literal", "nearest", "sum", "weighted")
+    assert knowledge.criteria == ("capped", "lex", "literal", "nearest", "sum", "weighted")
     assert len(knowledge.digest) == 64
     assert knowledge.alphabet.arms == ("psm1", "psm2")
 

@@ -104,6 +104,8 @@ PLANS: tuple[tuple[PlanningScene, str, str, int, tuple[str, ...]], ...] = (
     (TWO_FIXED, "literal", "visible", 3, ("",)),
     (TWO_FIXED, "lex", "visible", 3, ("",)),
     (TWO_FIXED, "nearest", "visible", 3, ("",)),
+    (TWO_FIXED, "capped", "visible", 3, ("",)),
+    (TISSUE, "capped", "visible", 3, ("", "tried(b(3,3))")),
     (TISSUE, "nearest", "visible", 3, ("tried(b(3,3))",)),
     (FREE, "lex", "visible", 3, ("",)),
     (ATTACHED, "weighted", "visible", 5, ("", f"{HELD} {LIMIT}")),

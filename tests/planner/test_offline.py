@@ -91,7 +91,7 @@ def test_a_context_alone_is_refused_with_its_error() -> None:
         planned({**CONTEXT, "fluents": ["flying(psm1)"]})
     with pytest.raises(UnknownAction, match="fly"):
         planned(CONTEXT, questions=["fly(psm1)"])
-    with pytest.raises(UnknownCriterion, match="known: lex"):
+    with pytest.raises(UnknownCriterion, match="known: capped, lex"):
         planned([], criterion="best")
 
 

@@ -16,7 +16,7 @@ Block = tuple[int, int]
 # Random scenes by their number of blocks along a side: a thousand for each criterion, if whole.
 THOUSAND = {3: 600, 4: 200, 5: 60, 6: 40, 7: 30, 8: 25, 9: 25, 10: 20}
 SCENES = {n: campaign.length(scenes, scenes // 5) for n, scenes in THOUSAND.items()}
-CRITERIA = ("sum", "literal", "lex", "nearest", "weighted")
+CRITERIA = ("sum", "literal", "lex", "nearest", "weighted", "capped")
 
 
 def whole_mm(a: tuple[float, ...], b: tuple[float, ...]) -> int:
@@ -57,6 +57,7 @@ def brute_force(
             "lex": (-sum(away), roi),
             "nearest": (-min(away, default=0), roi),
             "weighted": (-(2 * min(away, default=0) - roi),),
+            "capped": (-(2 * min([*away, 25] if away else [0]) - roi),),
         }[criterion]
         return (*rank, *block)
 

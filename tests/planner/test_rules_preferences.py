@@ -17,7 +17,17 @@ WORTH = {
     "lex": {"preference(b(1,1),100,1)", "preference(b(1,1),-7,2)"},
     "nearest": {"preference(b(1,1),20,1)", "preference(b(1,1),-7,2)"},
     "weighted": {"preference(b(1,1),33,1)"},
+    "capped": {"preference(b(1,1),33,1)"},
 }
+
+
+@pytest.mark.parametrize(("gap", "worth"), [(24, 41), (25, 43), (26, 43), (90, 43)])
+def test_what_is_farther_than_enough_counts_no_more(
+    knowledge: Knowledge, gap: int, worth: int
+) -> None:
+    facts = f"roi_distance(b(1,1),7). nearest_attachment(b(1,1),{gap})."
+    (atoms,) = models(knowledge, ["preferences/capped.lp"], facts)
+    assert f"preference(b(1,1),{worth},1)" in atoms
 
 
 @pytest.mark.parametrize("criterion", WORTH)

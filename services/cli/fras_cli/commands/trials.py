@@ -43,7 +43,7 @@ def run(
         bool, typer.Option("--no-limit", help="Switch the force limits off.")
     ] = False,
     criterion: Annotated[
-        str | None, typer.Option(help="sum, literal, lex, nearest or weighted.")
+        str | None, typer.Option(help="sum, literal, lex, nearest, weighted or capped.")
     ] = None,
     mesh: Mesh = None,
     confirm: Annotated[
@@ -179,8 +179,8 @@ def plan(
         Path, typer.Argument(help="A context as JSON, or a list of them; - for standard input.")
     ],
     criterion: Annotated[
-        str, typer.Option(help="sum, literal, lex, nearest or weighted, or one of your own.")
-    ] = "weighted",
+        str, typer.Option(help="sum, literal, lex, nearest, weighted, capped, or one of your own.")
+    ] = "capped",
     goal: Annotated[
         str, typer.Option(help="visible: the ROI is seen; clear: and no arm is at its limit.")
     ] = "visible",

@@ -141,7 +141,7 @@ class PlannerSection(Section, frozen=True, kw_only=True):
         Nothing of a new plan is done before a person has approved it.
     """
 
-    criterion: Literal["sum", "literal", "lex", "nearest", "weighted"] = "weighted"
+    criterion: Literal["sum", "literal", "lex", "nearest", "weighted", "capped"] = "capped"
     goal: Literal["visible", "clear"] = "visible"
     ignore_ap: bool = False
     max_replans: Annotated[int, Meta(ge=0, le=100)] = 5
