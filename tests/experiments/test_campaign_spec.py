@@ -221,7 +221,7 @@ def test_those_that_come_with_fras_can_begin():
     assert {name: len(one.trials) for name, one in told.items()} == {
         "retraction": 4,
         "no-limit": 2,
-        "criteria": 10,
+        "criteria": 12,
         "mesh": 8,
         "planning": 2 * 6 * 4,
         "replanning": 2 * 6 * 2,
