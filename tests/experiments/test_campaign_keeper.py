@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -10,9 +11,9 @@ from typing import Any
 import msgspec
 import pytest
 
-from fras_cli.trial import StackDied
+from fras_cli.trial import StackDied, TrialView
 from fras_common.errors import FrasError
-from fras_common.scenario import Scenario, resolve
+from fras_common.scenario import PatientSection, Scenario, resolve
 from fras_experiments.campaign import keeper
 from fras_experiments.campaign.code import code_digest
 from fras_experiments.campaign.keeper import Done, Keeper, Task
@@ -27,6 +28,10 @@ class Stacks:
     def __init__(self, folder: Path, patch: pytest.MonkeyPatch) -> None:
         self.folder = folder
         self.begun: list[str] = []
+        self.patients: list[bool] = []
+        # One that has nothing to do, and one that has.
+        self.plans = [SimpleNamespace(actions=actions) for actions in ([], ["reach"])]
+        self.ends: list[str] = []
         self.ended: list[str] = []
         self.cannot_start = 0
         self.gone = ""
@@ -37,24 +42,31 @@ class Stacks:
         patch.setattr(keeper, "read_trial", lambda log: log)
         patch.setattr(keeper, "measure", lambda log: self.measured)
         patch.setattr(keeper, "series_of", lambda log: ())
-        patch.setattr(keeper, "plan_times_s", lambda log: (0.1, 0.1))
+        patch.setattr(keeper, "planning_in", lambda log, timing: timing)
         whole = without_result(SCENARIO, "visible")
         self.measured = msgspec.structs.replace(whole, outcome="success", complete=True)
 
     @contextmanager
-    def own_stack(self, cell: str, connect: None, logs: Path, cancelled: Any) -> Generator[Any]:
+    def own_stack(
+        self, cell: str, connect: None, logs: Path, cancelled: Any, layout: Any
+    ) -> Generator[Any]:
         if self.cannot_start:
             self.cannot_start -= 1
             raise FrasError("the port is taken")
         logs.mkdir(parents=True)
         (logs / "sim.log").write_text("what sim said", encoding="utf-8")
         self.begun.append(cell)
+        self.patients.append(layout.patient)
         self.gone = ""
         link = SimpleNamespace(wait_complete=lambda timeout_s: True)
         yield SimpleNamespace(link=link, watch=lambda: self.gone)
         self.ended.append(cell)
 
-    def follow(self, follower: Any, trial: str, given: Any, folder: Path, **_: Any) -> bool:
+    def follow(
+        self, follower: Any, trial: str, given: Any, folder: Path, until: Any, **_: Any
+    ) -> bool:
+        views = [TrialView(), *(TrialView(plan=one) for one in self.plans)]  # type: ignore[arg-type]
+        self.ends = [until(view) for view in views]
         (folder / "audit.mcap").write_bytes(b"log of " + trial.encode())
         return self.play(folder)
 
@@ -74,6 +86,10 @@ def stacks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Stacks:
 
 def task(number: int) -> Task:
     return Task("c", number, msgspec.json.encode(SCENARIO))
+
+
+def until_plan(number: int) -> Task:
+    return replace(task(number), until="plan")
 
 
 def outcome(done: Done) -> tuple[str, str]:
@@ -164,4 +180,37 @@ def test_a_log_that_cannot_be_read_is_no_result(stacks: Stacks, monkeypatch: pyt
     monkeypatch.setattr(keeper, "read_trial", unreadable)
     one = stacks.worker()
     assert outcome(one.run(task(0))) == ("aborted", "stack: its log can't be read: FrasError")
+    stacks.end(one)
+
+
+def test_a_trial_with_a_patient_gets_a_stack_with_one(stacks: Stacks):
+    one = stacks.worker()
+    scenario = msgspec.structs.replace(SCENARIO, patient=PatientSection())
+    twin = Task("c", 1, msgspec.json.encode(scenario))
+    for asked in (task(0), twin, task(2), twin):
+        assert outcome(one.run(asked))[0] == "success"
+    # A stack with a patient serves trials without one, too.
+    assert stacks.patients == [False, True]
+    assert stacks.ended == stacks.begun[:1]
+    stacks.end(one)
+
+
+def test_a_trial_until_its_plan_is_ended_by_it_and_told_as_planned(stacks: Stacks):
+    reason = keeper.HAS_PLAN
+    stacks.measured = msgspec.structs.replace(stacks.measured, outcome="aborted", reason=reason)
+    one = stacks.worker()
+    done = one.run(until_plan(0))
+    assert outcome(done) == ("planned", "")
+    assert stacks.ends == ["", "", reason]
+    # How far it came in the meantime is chance.
+    assert done.record is not None
+    result = done.record.result
+    assert (result.plans, result.ticks, result.visibility, result.complete) == (1, None, None, True)
+    assert not done.files
+    assert len(stacks.begun) == 1
+    # Another end of it is told as what it is.
+    stacks.measured = msgspec.structs.replace(stacks.measured, reason="hold:sim")
+    assert outcome(one.run(until_plan(1))) == ("aborted", "hold:sim")
+    one.run(task(2))
+    assert stacks.ends == ["", "", ""]
     stacks.end(one)

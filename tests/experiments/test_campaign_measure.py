@@ -1,13 +1,17 @@
 """A trial's numbers, from what its log holds."""
 
+from dataclasses import replace
+
 from fras_cli.report import Trial
-from fras_cli.report.trial import RobotTick
-from fras_common.messages import Context, Plan, Pose, TaskStatus
+from fras_cli.report.trial import PatientTick, RobotTick
+from fras_common.messages import Context, Plan, PlannedAction, Pose, TaskStatus
 from fras_common.scenario import Scenario, resolve
-from fras_experiments.campaign.measure import measure, plan_times_s, series_of
+from fras_experiments.campaign.measure import measure, planning_in, series_of
+from fras_experiments.campaign.records import Timing
 from support.verdicts import verdict
 
 SCENARIO = resolve(Scenario(seed=3))
+UNTIMED = Timing(worker="0", wall_s=1.0, cpu_s=2.0)
 DOWN = (1.0, 0.0, 0.0, 0.0)
 
 
@@ -62,7 +66,9 @@ def test_a_trial_without_pull_or_grasp_says_so():
     result = measure(trial([], []))
     assert (result.crossings, result.lift_m, result.grasp_block) == (0, None, None)
     assert series_of(trial([], [])) == ()
-    assert plan_times_s(trial([], [])) == (None, None)
+    assert planning_in(trial([], []), UNTIMED) == UNTIMED
+    assert result.patient_max_force_n is None
+    assert result.missed_ticks is None
 
 
 def test_the_last_grasp_is_told_with_its_place():
@@ -89,12 +95,57 @@ def test_the_last_grasp_is_told_with_its_place():
     assert (result.roi_x_m, result.roi_y_m) == scene.roi_m[:2]
 
 
-def test_planning_is_told_by_the_first_and_the_median():
-    def plan(ground_s: float) -> Plan:
-        return Plan(
-            request_id="c0", reason="initial", criterion="weighted", goal="visible",
-            asp_digest="", ignore_ap=False, tried=[], actions=[], target="", arm="", history=[],
-            cost=[], models=1, ground_s=ground_s, solve_s=0.5, explanation=[], no_plan=None,
-        )  # fmt: skip
+def plan(request: str, ground_s: float, stamp_ns: int, *actions: str) -> Plan:
+    steps = [
+        PlannedAction(t=t, text=f"{name}(psm1)", name=name, args=["psm1"], expected=[])
+        for t, name in enumerate(actions)
+    ]
+    return Plan(
+        request_id=request, reason="initial", criterion="weighted", goal="visible",
+        asp_digest="", ignore_ap=False, tried=[], actions=steps, target="", arm="", history=[],
+        cost=[], models=1, ground_s=ground_s, solve_s=0.5, explanation=[], no_plan=None,
+        stamp_ns=stamp_ns,
+    )  # fmt: skip
 
-    assert plan_times_s(trial([], [], plans=[plan(0.5), plan(0.1), plan(0.2)])) == (1.0, 0.7)
+
+def asked(request: str, stamp_ns: int) -> Context:
+    return Context(
+        request_id=request, fluents=[], evidence={}, names=[], blocks_m=[], roi_m=(0.0, 0.0, 0.0),
+        fixed_points_m=[], monitored=[], stamp_ns=stamp_ns,
+    )  # fmt: skip
+
+
+def test_planning_is_told_by_the_first_and_the_median():
+    plans = [plan(f"c{n}", ground_s, 0) for n, ground_s in enumerate((0.5, 0.1, 0.2))]
+    timing = planning_in(trial([], [], plans=plans), UNTIMED)
+    assert (timing.plan_first_s, timing.plan_median_s) == (1.0, 0.7)
+    # Of a log that lacks the contexts, nobody knows how long a plan took on its way.
+    assert timing.plan_service_s is None
+    assert timing.wall_s == UNTIMED.wall_s
+
+
+def test_planning_through_the_service_is_from_context_to_plan():
+    contexts = [asked(f"c{n}", 1_000_000_000 * n) for n in range(1, 6)]
+    ms = 1_000_000
+    plans = [
+        plan("c1", 0.1, 1_000_000_000 + 7 * ms, "reach", "grasp", "pull"),
+        plan("c2", 0.1, 2_000_000_000 + 8 * ms),  # no plan was found: nothing was planned anew
+        plan("c3", 0.1, 3_000_000_000 + 9 * ms, "release", "reach", "grasp", "pull"),
+        plan("c4", 0.1, 4_000_000_000 + 5 * ms, "move"),
+        plan("c5", 0.1, 5_000_000_000 + 6 * ms, "move"),
+    ]
+    timing = planning_in(trial([], [], plans=plans, contexts=contexts), UNTIMED)
+    assert (timing.plan_service_s, timing.replan_move_s, timing.replan_release_s) == (
+        0.007, 0.005, 0.009,
+    )  # fmt: skip
+    plans[2:] = [plan("c3", 0.1, 3_000_000_000, "reach", "grasp", "pull")]
+    timing = planning_in(trial([], [], plans=plans, contexts=contexts), UNTIMED)
+    assert (timing.replan_move_s, timing.replan_release_s) == (None, None)
+
+
+def test_what_the_patient_bore_is_told_beside_what_was_believed():
+    borne = [PatientTick(tick, force, force) for tick, force in enumerate((0.2, 0.7, 0.9, 0.4))]
+    told = replace(trial([], [0.1, 0.4, 0.6, 0.55]), patient=tuple(borne))
+    result = measure(told)
+    assert (result.patient_max_force_n, result.max_force_n) == (0.9, 0.6)
+    assert (result.patient_above_ticks, result.missed_ticks, result.needless_ticks) == (2, 1, 1)

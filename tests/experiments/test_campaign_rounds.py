@@ -4,6 +4,7 @@ from collections.abc import Callable, Generator, Mapping
 from pathlib import Path
 from typing import Any, cast
 
+import msgspec
 import pytest
 
 from fras_cli.trial import NobodyRunsTrials
@@ -132,3 +133,11 @@ def test_the_pace_counts_what_this_command_has_done():
         assert record is not None
         pace.count(record)
     assert pace.in_words() == "6.0 a minute · 0:01:00 left · 0% success"
+
+
+def test_the_pace_of_trials_that_end_with_their_plan_counts_plans():
+    record = done(Task("c", 0, b"")).record
+    assert record is not None
+    planned = msgspec.structs.replace(record.result, outcome="planned")
+    pace = Pace(2, {0: msgspec.structs.replace(record, result=planned)})
+    assert pace.in_words() == "100% planned"

@@ -95,6 +95,7 @@ def test_a_digest_knows_whatever_is_asked_for():
         digest(seeds=range(3)),
         digest(seeds=range(4)),
         digest(set={"awareness.blocks": 6}),
+        digest(until="plan"),
     ]
     assert len(set(told)) == len(told)
     assert digest() == told[0]
@@ -161,6 +162,7 @@ def test_what_cannot_be_is_named_with_its_place(tmp_path: Path, text: str):
         ('name = "x"\nscenario = "nowhere"', "neither a file"),
         ('name = "x"\nscenario = "nowhere.toml"', "cannot be read"),
         ('name = "x"\ndesign = "random"', "one-at-a-time"),
+        ('name = "x"\nuntil = "dawn"', "end, plan"),
         ('name = "x"\nsed = "1..2"', "seeds"),
         ('name = "x"\nseeds = "0..100000"', "at most 100000"),
     ],
@@ -219,10 +221,15 @@ def test_those_that_come_with_fras_can_begin():
     assert {name: len(one.trials) for name, one in told.items()} == {
         "retraction": 4,
         "no-limit": 2,
-        "criteria": 10,
+        "criteria": 12,
         "mesh": 8,
+        "planning": 2 * 6 * 4,
+        "replanning": 2 * 6 * 2,
         "sensitivity": 2 * 21,
+        "twin": 2 * 4 * 3,
     }
+    assert {name for name, one in told.items() if one.campaign.until == "plan"} == {"planning"}
+    assert all(one.scenario.has_patient for one in told["twin"].trials)
     pair = told["retraction"].trials[:2]
     assert [one.scenario.planner.ignore_ap for one in pair] == [False, True]
     assert pair[0].scenario.scene == pair[1].scenario.scene

@@ -140,15 +140,17 @@ def test_tables_have_a_row_a_trial_in_the_campaigns_order(tmp_path: Path, prepar
     assert lines[0] == (
         "campaign,trial,scenario,seed,planner.ignore_ap,outcome,reason,scenario_kind,complete,"
         "visibility,max_force_n,soft_limit_n,hard_limit_n,crossings,longest_above_ticks,plans,"
-        "replans,actions,ticks,grasp_block,grasp_x_m,grasp_y_m,roi_x_m,roi_y_m,lift_m,log"
+        "replans,actions,ticks,grasp_block,grasp_x_m,grasp_y_m,roi_x_m,roi_y_m,lift_m,"
+        "patient_max_force_n,patient_above_ticks,missed_ticks,needless_ticks,log"
     )
     assert lines[1].startswith('retraction,1,default,0,true,success,"visible, at last",,true,0.333')
     assert [line.split(",")[1] for line in lines[1:]] == ["1", "3"]
     timing = (tmp_path / "timing.csv").read_text(encoding="utf-8").splitlines()
     assert timing == [
-        "trial,worker,wall_s,cpu_s,plan_first_s,plan_median_s",
-        "1,0,1.5,2,,",
-        "3,0,1.5,2,,",
+        "trial,worker,wall_s,cpu_s,plan_first_s,plan_median_s,plan_service_s,replan_move_s,"
+        "replan_release_s",
+        "1,0,1.5,2,,,,,",
+        "3,0,1.5,2,,,,,",
     ]
     series = (tmp_path / "series" / "1.csv").read_text(encoding="utf-8")
     assert series == "tick,height_m,force_n,visibility\n0,0,0.1,0\n"

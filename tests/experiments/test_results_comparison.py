@@ -83,6 +83,18 @@ def test_a_swept_field_joins_where_a_seed_has_several_trials(tmp_path: Path):
     assert "share a scene" in footnotes(compare(first, second, seed=0))
 
 
+def test_two_values_of_a_field_are_paired_by_the_other_fields(tmp_path: Path):
+    names = ("twin.stiffness", "twin.shift")
+    cross = [dict(zip(names, (a, b), strict=True)) for a in "12" for b in "345"]
+    rows = [{"seed": seed, **point} for seed in range(2) for point in cross]
+    whole = trials(tmp_path, rows, swept=names)
+    soft, stiff = (chosen(whole, {"twin.stiffness": value}) for value in "12")
+    pairs = pair(soft, stiff)
+    assert pairs.by == ("scenario", "seed", "twin.shift")
+    assert len(pairs.first) == 6
+    assert pairs.first.swept["twin.shift"].tolist() == pairs.second.swept["twin.shift"].tolist()
+
+
 def test_what_can_not_be_paired_is_named(tmp_path: Path):
     first = trials(tmp_path / "a", [{"seed": 1}, {"seed": 2}])
     with pytest.raises(BadResults, match=r"no scenario and seed in common.*seeds 1 to 2.*7 to 7"):

@@ -92,7 +92,7 @@ def folder(tmp_path: Path) -> Path:
         ("trials.csv", "0.75", "high", r"line 3, column visibility: 'high' is not a"),
         ("trials.csv", "0.75", "1.75", r"line 3, column visibility: '1\.75' is not a share"),
         ("trials.csv", "0.75", "-0.1", r"line 3, column visibility: '-0\.1' is not a share"),
-        ("trials.csv", "0.75,", "", r"trials\.csv, line 3: 24 cells, where the header has 25"),
+        ("trials.csv", "0.75,", "", r"trials\.csv, line 3: 28 cells, where the header has 29"),
         (
             "trials.csv",
             "made-up,1,",

@@ -11,6 +11,7 @@ COLUMNS: Final = (
     *("outcome", "reason", "scenario_kind", "complete", "visibility", "max_force_n"),
     *("soft_limit_n", "hard_limit_n", "crossings", "longest_above_ticks", "plans", "replans"),
     *("actions", "ticks", "grasp_block", "grasp_x_m", "grasp_y_m", "roi_x_m", "roi_y_m", "lift_m"),
+    *("patient_max_force_n", "patient_above_ticks", "missed_ticks", "needless_ticks"),
     "log",
 )
 PLAIN: Final[dict[str, Any]] = {
@@ -19,6 +20,7 @@ PLAIN: Final[dict[str, Any]] = {
     "soft_limit_n": 0.5, "hard_limit_n": 1, "crossings": 0, "longest_above_ticks": 0, "plans": 2,
     "replans": 0, "actions": 3, "ticks": 300, "grasp_block": "b(4,4)", "grasp_x_m": 0.05,
     "grasp_y_m": 0.06, "roi_x_m": 0.03, "roi_y_m": 0.05, "lift_m": 0.05, "log": "",
+    "patient_max_force_n": "", "patient_above_ticks": "", "missed_ticks": "", "needless_ticks": "",
 }  # fmt: skip
 
 
@@ -55,6 +57,7 @@ def results_folder(
             )
     if timing is not None:
         times = ("wall_s", "cpu_s", "plan_first_s", "plan_median_s")
+        times += ("plan_service_s", "replan_move_s", "replan_release_s")
         table(folder / "timing.csv", ("trial", "worker", *times), timing)
     return folder
 

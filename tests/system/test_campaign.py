@@ -1,5 +1,6 @@
 """`fras experiment` on real stacks: killed and resumed, with one worker and two, on a cluster."""
 
+import csv
 import os
 import signal
 import socket
@@ -147,6 +148,41 @@ def test_a_cluster_that_is_there_gives_the_same(
         assert "Traceback" not in command.text
     folder = tmp_path / "six"
     assert len(table(folder)) == 1 + kept(folder)
+
+
+UNTIL_PLAN = """
+[campaign]
+name = "plans"
+seeds = "2..2"
+until = "plan"
+[set]
+"tissue.node_counts" = [11, 13, 2]
+[[cases]]
+"awareness.blocks" = 5
+[[cases]]
+"awareness.blocks" = 6
+"patient.young_modulus_factor" = 1.3
+"""
+
+
+def test_a_trial_until_its_plan_ends_there_with_a_patient_and_without(
+    tmp_path: Path, fras: Callable[..., Any]
+):
+    (tmp_path / "plans.toml").write_text(UNTIL_PLAN, encoding="utf-8")
+    command = fras("experiment", "plans.toml", "--out", "r")
+    assert command.end() == 0, command.text
+    assert "2 of 2 trials: 2 planned" in command.text
+    with (tmp_path / "r" / "trials.csv").open(encoding="utf-8") as file:
+        plain, twin = csv.DictReader(file)
+    for row in (plain, twin):
+        assert (row["outcome"], row["complete"], row["plans"]) == ("planned", "true", "1"), row
+        # How far the arms had come is chance, and not told.
+        assert row["ticks"] == row["visibility"] == row["patient_max_force_n"] == "", row
+    assert (plain["patient.young_modulus_factor"], twin["awareness.blocks"]) == ("", "6")
+    with (tmp_path / "r" / "timing.csv").open(encoding="utf-8") as file:
+        for row in csv.DictReader(file):
+            assert float(row["plan_service_s"]) > float(row["plan_first_s"]) > 0.0
+            assert row["replan_move_s"] == row["replan_release_s"] == ""
 
 
 def test_bad_input_is_named_before_anything_starts(

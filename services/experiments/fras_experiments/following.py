@@ -28,8 +28,7 @@ def follow_to_end(
     trial: str,
     given: TrialInput,
     folder: Path,
-    until: Callable[[], bool],
-    why: str,
+    until: Callable[[TrialView], str],
     give_up: Callable[[], bool] = lambda: False,
 ) -> bool:
     """Run a trial until its log is closed.
@@ -41,7 +40,7 @@ def follow_to_end(
     folder : Path
         Of its log.
     until : callable
-        True ends the trial early: it is aborted for the reason `why`.
+        Says why the trial is to be aborted, or nothing while it is to go on.
     give_up : callable
         True leaves it where it is, also while it is being aborted.
 
@@ -57,13 +56,15 @@ def follow_to_end(
     TrialRefused, NoAnswer
     """
     follower.start(trial, given.scenario, folder, given.mesh)
-    if follower.follow(_unseen, stop=lambda: until() or give_up()):
+    why = ""
+
+    def look(view: TrialView) -> None:
+        nonlocal why
+        why = why or until(view)
+
+    if follower.follow(look, stop=lambda: bool(why) or give_up()):
         return True
     if give_up():
         return False
     follower.abort(why)
-    return follower.follow(_unseen, stop=give_up)
-
-
-def _unseen(view: TrialView) -> None:
-    """Nobody watches a trial of a campaign."""
+    return follower.follow(look, stop=give_up)

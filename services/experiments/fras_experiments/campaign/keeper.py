@@ -17,13 +17,21 @@ from distributed import Worker, WorkerPlugin, get_worker
 
 from fras_cli.options import TrialInput
 from fras_cli.report import read_trial
-from fras_cli.stack import UsedStack, own_stack
-from fras_cli.trial import TrialFollower
+from fras_cli.stack import Layout, UsedStack, own_stack
+from fras_cli.trial import TrialFollower, TrialView
 from fras_common.errors import FrasError
 from fras_common.scenario import Scenario
 from fras_experiments.campaign.code import code_digest, code_version
-from fras_experiments.campaign.measure import measure, plan_times_s, series_of
-from fras_experiments.campaign.records import SUCCESS, Record, Timing, without_result
+from fras_experiments.campaign.measure import measure, planning_in, series_of
+from fras_experiments.campaign.records import (
+    PLANNED,
+    SUCCESS,
+    Record,
+    Timing,
+    until_plan,
+    without_result,
+)
+from fras_experiments.campaign.spec import Until
 from fras_experiments.following import LOG, follow_to_end, lay_out
 
 READY_S: Final = 60.0
@@ -31,7 +39,8 @@ PATIENCE_S: Final = 900.0
 IDLE_S: Final = 60.0
 ROOM_BYTES: Final = 256 * 2**20
 TOO_LONG: Final = "campaign: the trial takes too long"
-STARTS: Final = 2
+HAS_PLAN: Final = "campaign: it was to end with its first plan"
+WELL: Final = (SUCCESS, PLANNED)
 
 
 @dataclass(frozen=True)
@@ -41,6 +50,7 @@ class Task:
     campaign: str
     number: int
     scenario: bytes
+    until: Until = "end"
 
 
 @dataclass(frozen=True)
@@ -70,6 +80,7 @@ class _Held:
     used: UsedStack
     follower: TrialFollower
     logs: Path
+    patient: bool
 
 
 class Keeper(WorkerPlugin):
@@ -142,14 +153,14 @@ class Keeper(WorkerPlugin):
             self._folder.mkdir(parents=True, exist_ok=True)
             if full := self._full():
                 return self._unable(task, full)
-            held = self._stack()
+            given = TrialInput(msgspec.json.decode(task.scenario, type=Scenario), self._mesh)
+            held = self._stack(patient=given.scenario.has_patient)
         except (FrasError, OSError) as error:
             return self._unable(task, f"no stack could be started: {error}")
-        given = TrialInput(msgspec.json.decode(task.scenario, type=Scenario), self._mesh)
         folder = self._folder / f"trial-{task.number}"
         shutil.rmtree(folder, ignore_errors=True)
         began_s, cpu_began_s = time.monotonic(), _cpu_s()
-        died = self._play(held, f"{self.name}-{task.number}", given, folder)
+        died = self._play(held, f"{self.name}-{task.number}", given, folder, task.until)
         if self._over:
             return self._unable(task, "it was told to end")
         timing = Timing(worker=self._worker, wall_s=0.0, cpu_s=0.0)
@@ -163,7 +174,7 @@ class Keeper(WorkerPlugin):
         if record.result.outcome == "aborted" and (full := self._full()):
             # It says nothing of the scene, and would not be run again.
             return self._unable(task, full)
-        ended_well = not died and record.result.outcome == SUCCESS and record.result.complete
+        ended_well = not died and record.result.complete and record.result.outcome in WELL
         files: dict[str, bytes] = {}
         if self._keep == "all" or (self._keep == "failed" and not ended_well):
             files = _packed(folder, held.logs if died else None)
@@ -178,9 +189,16 @@ class Keeper(WorkerPlugin):
         short = room < ROOM_BYTES
         return f"the disk is full: {room >> 20} MiB free in {self._folder}" if short else ""
 
-    def _play(self, held: _Held, trial: str, given: TrialInput, folder: Path) -> str:
+    def _play(self, held: _Held, trial: str, given: TrialInput, folder: Path, until: Until) -> str:
         """Run a trial; return why its stack serves no more, or nothing."""
         until_s = time.monotonic() + PATIENCE_S
+
+        def why_end(view: TrialView) -> str:
+            # A plan without actions ends the trial by itself: there is none, or nothing to do.
+            if until == "plan" and view.plan is not None and view.plan.actions:
+                return HAS_PLAN
+            return TOO_LONG if time.monotonic() > until_s else ""
+
         try:
             lay_out(folder, given)
             ended = follow_to_end(
@@ -188,16 +206,17 @@ class Keeper(WorkerPlugin):
                 trial,
                 given,
                 folder,
-                until=lambda: time.monotonic() > until_s,
-                why=TOO_LONG,
+                until=why_end,
                 give_up=lambda: self._over or time.monotonic() > until_s + READY_S,
             )
         except (FrasError, OSError) as error:
             return str(error)
         return "" if ended else TOO_LONG
 
-    def _stack(self) -> _Held:
+    def _stack(self, *, patient: bool) -> _Held:
         """Return the stack that is there, or start one.
+
+        One with a patient serves trials without, too.
 
         Raises
         ------
@@ -205,6 +224,8 @@ class Keeper(WorkerPlugin):
             None could be started, tried twice.
         """
         if self._held is not None and self._held.used.watch():
+            self._close()
+        if self._held is not None and patient and not self._held.patient:
             self._close()
         for last in (False, True):
             if self._held is not None:
@@ -214,14 +235,20 @@ class Keeper(WorkerPlugin):
             logs = self._folder / f"stack-{self._lives}"
             try:
                 used = self._inside.enter_context(
-                    own_stack(cell, None, logs, cancelled=lambda: self._over)
+                    own_stack(
+                        cell,
+                        None,
+                        logs,
+                        cancelled=lambda: self._over,
+                        layout=Layout(patient=patient),
+                    )
                 )
             except FrasError:
                 # Somebody may have taken the port in between.
                 if last or self._over:
                     raise
             else:
-                self._held = _Held(used, TrialFollower(used), logs)
+                self._held = _Held(used, TrialFollower(used), logs, patient)
         if self._held is None:
             raise AssertionError
         return self._held
@@ -258,11 +285,11 @@ def _record(scenario: Scenario, log: Path, died: str, timing: Timing) -> Record:
     except FrasError as error:
         result = without_result(scenario, f"stack: its log can't be read: {error.kind}")
         return Record(code=code_version(), result=result, timing=timing)
-    first_s, median_s = plan_times_s(trial)
-    timing = msgspec.structs.replace(timing, plan_first_s=first_s, plan_median_s=median_s)
-    return Record(
-        code=code_version(), result=measure(trial), timing=timing, series=series_of(trial)
-    )
+    result, series = measure(trial), series_of(trial)
+    if (result.outcome, result.reason) == ("aborted", HAS_PLAN):
+        result, series = until_plan(scenario, complete=result.complete), ()
+    timing = planning_in(trial, timing)
+    return Record(code=code_version(), result=result, timing=timing, series=series)
 
 
 def _packed(folder: Path, logs: Path | None) -> dict[str, bytes]:

@@ -1,15 +1,17 @@
 """From a trial's log to its numbers."""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
 from statistics import median
 from typing import Final
 
+import msgspec
+
 from fras_cli.report import Trial, summarise
 from fras_cli.report.trial import RobotTick
-from fras_common.messages import Verdict
-from fras_experiments.campaign.records import Lifted, Result, limits_of
+from fras_common.messages import Plan, Verdict
+from fras_experiments.campaign.records import Lifted, Result, Timing, limits_of
 
 EVERY_TICKS: Final = 5
 _GRASP: Final = re.compile(r"grasp\(\w+,(.+)\)")
@@ -25,6 +27,7 @@ def measure(trial: Trial) -> Result:
     place_m = _rest_of(trial, block)
     roi_m = trial.scenario.scene.roi_m if trial.scenario.scene else (None, None)
     pulls = [heights for _, heights in _lifts(trial)]
+    patient = summary.patient or None
     return Result(
         outcome=summary.outcome,
         reason=summary.reason,
@@ -46,6 +49,10 @@ def measure(trial: Trial) -> Result:
         roi_x_m=roi_m[0],
         roi_y_m=roi_m[1],
         lift_m=max(pulls[-1], default=None) if pulls else None,
+        patient_max_force_n=patient.max_force_n if patient else None,
+        patient_above_ticks=patient.ticks_above_limit if patient else None,
+        missed_ticks=patient.missed if patient else None,
+        needless_ticks=patient.needless if patient else None,
     )
 
 
@@ -60,10 +67,36 @@ def series_of(trial: Trial) -> tuple[Lifted, ...]:
     )
 
 
-def plan_times_s(trial: Trial) -> tuple[float | None, float | None]:
-    """Grounding and solving: of the first plan, and the median over all [s]."""
+def planning_in(trial: Trial, timing: Timing) -> Timing:
+    """Add to a trial's timing how long its plans took.
+
+    Those through the planner are from the stamp of SA's context to that of the plan, as both lie
+    in the log: the context's way, what the planner does with it, and the plan's encoding.
+    """
     took_s = [plan.ground_s + plan.solve_s for plan in trial.plans]
-    return (took_s[0], median(took_s)) if took_s else (None, None)
+    if not took_s:
+        return timing
+    asked_ns = {one.request_id: one.stamp_ns for one in trial.contexts}
+
+    def through_s(plans: Iterable[Plan]) -> float | None:
+        for plan in plans:
+            began_ns = asked_ns.get(plan.request_id)
+            return None if began_ns is None else (plan.stamp_ns - began_ns) / 1e9
+        return None
+
+    later = [one for one in trial.plans[1:] if one.actions]
+    return msgspec.structs.replace(
+        timing,
+        plan_first_s=took_s[0],
+        plan_median_s=median(took_s),
+        plan_service_s=through_s(trial.plans[:1]),
+        replan_move_s=through_s(one for one in later if not _does(one) & {"release", "grasp"}),
+        replan_release_s=through_s(one for one in later if "release" in _does(one)),
+    )
+
+
+def _does(plan: Plan) -> set[str]:
+    return {action.name for action in plan.actions}
 
 
 def _above(trial: Trial, limit_n: float) -> tuple[int, int]:

@@ -1,6 +1,7 @@
 """How far a campaign is: done of all, trials a minute, time left, successes so far."""
 
 import time
+from collections import Counter
 from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
 
@@ -8,10 +9,10 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
-from fras_experiments.campaign.records import SUCCESS, Record
+from fras_experiments.campaign.records import PLANNED, SUCCESS, Record
 from fras_experiments.campaign.spec import TrialSpec
 
-STYLES = {SUCCESS: "green", "aborted": "bold red"}
+STYLES = {SUCCESS: "green", PLANNED: "green", "aborted": "bold red"}
 
 
 class Pace:
@@ -35,7 +36,7 @@ class Pace:
     ) -> None:
         self.total = total
         self.done = len(before)
-        self._successes = sum(one.result.outcome == SUCCESS for one in before.values())
+        self._outcomes = Counter(one.result.outcome for one in before.values())
         self._now = 0
         self._clock = clock
         self._began_s = clock()
@@ -44,7 +45,7 @@ class Pace:
         """Count one more."""
         self.done += 1
         self._now += 1
-        self._successes += record.result.outcome == SUCCESS
+        self._outcomes[record.result.outcome] += 1
 
     def in_words(self) -> str:
         """Tell rate, time left and success so far."""
@@ -56,7 +57,8 @@ class Pace:
             hours, minutes = divmod(minutes, 60)
             said += [f"{a_minute:.1f} a minute", f"{hours}:{minutes:02d}:{seconds:02d} left"]
         if self.done:
-            said.append(f"{self._successes / self.done:.0%} success")
+            well = PLANNED if self._outcomes[PLANNED] else SUCCESS
+            said.append(f"{self._outcomes[well] / self.done:.0%} {well}")
         return " · ".join(said)
 
 
@@ -78,7 +80,7 @@ def shown(console: Console, pace: Pace) -> Generator[Callable[[TrialSpec, Record
         result = record.result
         if bar.disable or result.outcome == "aborted":
             text = f"trial {one.number}, seed {one.scenario.seed}: {result.outcome}"
-            text += f", {result.reason}" if result.outcome != SUCCESS else ""
+            text += f", {result.reason}" if result.outcome not in (SUCCESS, PLANNED) else ""
             text += f" ({pace.done} of {pace.total}; {pace.in_words()})" if bar.disable else ""
             console.print(escape(text), style=STYLES.get(result.outcome, ""), soft_wrap=True)
 

@@ -18,6 +18,7 @@ from fras_experiments.campaign.spec import (
     Campaign,
     Sample,
     TrialSpec,
+    Until,
     digest_of,
     expand,
 )
@@ -26,10 +27,14 @@ FAULTS: Final = "faults"
 MESH: Final = "tissue.node_counts"
 KNOWN: Final = {
     "file": "campaign, set, sweep, cases, sample",
-    "campaign": "name, scenario, seeds, design, about",
+    "campaign": "name, scenario, seeds, design, until, about",
     "sample": "count, seed, fields",
 }
-CHOICES: Final = {"design": "factorial, one-at-a-time", "scale": "linear, log"}
+CHOICES: Final = {
+    "design": "factorial, one-at-a-time",
+    "until": "end, plan",
+    "scale": "linear, log",
+}
 NAME: Final = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,79}$"
 
 
@@ -39,6 +44,7 @@ class _Head(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     seeds: str | None = None
     design: Literal["factorial", "one-at-a-time"] = "factorial"
     about: str = ""
+    until: Until = "end"
 
 
 class _File(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -129,6 +135,7 @@ def read_campaign(path: Path) -> Campaign:
         seeds=None if head.seeds is None else _seeds(path, head.seeds),
         design=head.design,
         about=head.about,
+        until=head.until,
         set=file.set,
         sweep=file.sweep,
         cases=file.cases,
@@ -189,6 +196,7 @@ def to_toml(campaign: Campaign, stored: Mapping[str, str]) -> str:
         "scenario": campaign.scenario,
         "seeds": None if seeds is None else f"{seeds.start}..{seeds.stop - 1}",
         "design": campaign.design,
+        "until": campaign.until,
     }
     document = tomlkit.document()
     document["campaign"] = {key: value for key, value in head.items() if value is not None}

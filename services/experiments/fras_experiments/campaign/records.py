@@ -8,6 +8,8 @@ import msgspec
 from fras_common.scenario import Scenario
 
 SUCCESS: Final = "success"
+PLANNED: Final = "planned"
+"""Outcome of a trial that was to end once its first plan was published, and did."""
 
 
 class Result(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -36,6 +38,12 @@ class Result(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         Region of interest [m].
     lift_m : float or None
         Largest height of the tip above where the last pull began [m].
+    patient_max_force_n : float or None
+        What the patient bore over the trial, by the scenario's metric [N]; None without a patient,
+        as the others of it.
+    patient_above_ticks, missed_ticks, needless_ticks : int or None
+        Ticks in which the patient bore more than the soft limit; those of them in which the model
+        did not say so; ticks in which only the model said so.
     """
 
     outcome: str
@@ -58,6 +66,10 @@ class Result(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     roi_x_m: float | None = None
     roi_y_m: float | None = None
     lift_m: float | None = None
+    patient_max_force_n: float | None = None
+    patient_above_ticks: int | None = None
+    missed_ticks: int | None = None
+    needless_ticks: int | None = None
 
 
 class Timing(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -71,6 +83,11 @@ class Timing(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
         Of the trial and of making numbers of its log; processor time of stack and worker.
     plan_first_s, plan_median_s : float or None [s]
         Grounding and solving of its plans.
+    plan_service_s : float or None [s]
+        Of its first plan through the planner: from the stamp of SA's context to that of the plan.
+    replan_move_s, replan_release_s : float or None [s]
+        The same, of its first later plan that keeps the grasp (scenario B), and of the first that
+        releases it (C).
     """
 
     worker: str
@@ -78,6 +95,9 @@ class Timing(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     cpu_s: float
     plan_first_s: float | None = None
     plan_median_s: float | None = None
+    plan_service_s: float | None = None
+    replan_move_s: float | None = None
+    replan_release_s: float | None = None
 
 
 class Lifted(msgspec.Struct, frozen=True, array_like=True):
@@ -140,3 +160,12 @@ def without_result(scenario: Scenario, reason: str) -> Result:
         roi_x_m=roi_m[0] if roi_m else None,
         roi_y_m=roi_m[1] if roi_m else None,
     )
+
+
+def until_plan(scenario: Scenario, *, complete: bool) -> Result:
+    """Make the result of a trial that was ended with its first plan.
+
+    How far the arms had come by then differs from run to run, and is not told.
+    """
+    bare = without_result(scenario, "")
+    return msgspec.structs.replace(bare, outcome=PLANNED, complete=complete, plans=1)

@@ -58,8 +58,9 @@ class Round:
         """
         name = f"campaign-{uuid.uuid4().hex[:8]}"
         keeper = Keeper(name, self.prepared.mesh, self.keep, code_digest(), own=cluster.own)
+        until = self.prepared.campaign.until
         tasks = {
-            number: Task(name, number, msgspec.json.encode(one.scenario))
+            number: Task(name, number, msgspec.json.encode(one.scenario), until)
             for number, one in left.items()
         }
         waiting = dict(left)

@@ -15,6 +15,7 @@ from fras_common.scenario import Scenario, ScenarioError, resolve
 from fras_common.scenario.loader import convert
 
 MOST_TRIALS: Final = 100_000
+Until = Literal["end", "plan"]
 FORBIDDEN: Final[dict[str, str]] = {
     "seed": "is what campaign.seeds gives",
     "scene": "is drawn from the seeds; for one scene leave campaign.seeds out, and give the "
@@ -73,6 +74,8 @@ class Campaign:
         alone against it.
     set, sweep : dict
         By the dotted path of a scenario's field: one value for all trials, or several to try.
+    until : {"end", "plan"}
+        Where a trial ends: by itself, or once its first plan is published.
     cases : tuple of dict
         Values that go together; with `factorial` each case meets every other variation.
     """
@@ -82,6 +85,7 @@ class Campaign:
     seeds: range | None = None
     design: Literal["factorial", "one-at-a-time"] = "factorial"
     about: str = ""
+    until: Until = "end"
     set: dict[str, Any] = field(default_factory=dict[str, Any])
     sweep: dict[str, list[Any]] = field(default_factory=dict[str, list[Any]])
     cases: tuple[dict[str, Any], ...] = ()
@@ -162,7 +166,7 @@ def expand(
 
 
 def digest_of(campaign: Campaign, trials: Sequence[TrialSpec], mesh: bytes) -> str:
-    """SHA-256 over what a campaign asks for: its name, its trials, the mesh.
+    """SHA-256 over what a campaign asks for: its name, its trials, where they end, the mesh.
 
     Returns
     -------
@@ -170,7 +174,10 @@ def digest_of(campaign: Campaign, trials: Sequence[TrialSpec], mesh: bytes) -> s
         Hexadecimal.
     """
     digest = hashlib.sha256(hashlib.sha256(mesh).digest())
-    for part in (campaign.name, *((dict(one.labels), one.scenario) for one in trials)):
+    asked: list[object] = [campaign.name, *((dict(one.labels), one.scenario) for one in trials)]
+    # What was asked for before there was a choice is still the same.
+    asked += [] if campaign.until == "end" else [campaign.until]
+    for part in asked:
         encoded = msgspec.json.encode(part)
         digest.update(len(encoded).to_bytes(8, "little") + encoded)
     return digest.hexdigest()

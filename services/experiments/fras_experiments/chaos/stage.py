@@ -57,7 +57,7 @@ class Stage:
         log = lay_out(folder, given)
         self.injector.begin(trial, log, faults)
         try:
-            follow_to_end(self.follower, trial, given, folder, until, ABORT)
+            follow_to_end(self.follower, trial, given, folder, lambda _: ABORT if until() else "")
         finally:
             injected = self.injector.end()
         return log, injected

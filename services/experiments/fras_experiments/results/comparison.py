@@ -107,13 +107,15 @@ def scaled(trials: Trials, name: str) -> NDArray[np.float64]:
 def pair(first: Trials, second: Trials) -> Pairs:
     """Pair by scenario and seed; by the fields that both sweep, too, where these are not enough.
 
+    A field that has one value here and another one there is what is compared, and pairs nothing.
     The order of the rows is of no matter; the pairs come in the order of their keys.
 
     Raises
     ------
     BadResults
     """
-    both = tuple(sorted(first.swept.keys() & second.swept.keys()))
+    swept = sorted(first.swept.keys() & second.swept.keys())
+    both = tuple(one for one in swept if not _apart(first.swept[one], second.swept[one]))
     by: tuple[str, ...] = ("scenario", "seed")
     ours, others = _rows(first, by), _rows(second, by)
     if both and not (_unique(ours) and _unique(others)):
@@ -153,6 +155,12 @@ def _rows(trials: Trials, by: tuple[str, ...]) -> dict[Key, list[int]]:
     for row, key in enumerate(zip(*columns, strict=True)):
         found.setdefault(key, []).append(row)
     return found
+
+
+def _apart(ours: NDArray[np.str_], others: NDArray[np.str_]) -> bool:
+    """Whether a field has one value here and another one there: it is what is compared."""
+    here, there = np.unique(ours), np.unique(others)
+    return here.size == there.size == 1 and here[0] != there[0]
 
 
 def _unique(rows: Mapping[Key, list[int]]) -> bool:

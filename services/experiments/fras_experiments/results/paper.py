@@ -79,6 +79,13 @@ REPLAN_C_S: Final[dict[int, Stated]] = {
 """Table I: re-planning in scenario C at f = 50 % [s]."""
 
 
+def plan_at(blocks: int, fraction: float) -> Stated | None:
+    """Return the first planning time at N and f [s]; None where Table I has no such cell."""
+    at = [i for i, percent in enumerate(F_PERCENT) if abs(percent - 100.0 * fraction) < 1e-6]
+    row = PLAN_S.get(blocks)
+    return row[at[0]] if row and at else None
+
+
 def plan_s(blocks: int) -> float | None:
     """Mean first planning time over all f [s]; None for an N that is not in Table I."""
     row = PLAN_S.get(blocks)

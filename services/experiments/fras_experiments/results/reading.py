@@ -20,6 +20,8 @@ TRIALS: Final = "trials.csv"
 TIMING: Final = "timing.csv"
 SERIES: Final = "series"
 TIMES: Final = ("wall_s", "cpu_s", "plan_first_s", "plan_median_s")
+LATER_TIMES: Final = ("plan_service_s", "replan_move_s", "replan_release_s")
+"""Tables of before have none of them."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +34,11 @@ class Timing:
     wall_s, cpu_s : float array [s]
         Of the whole trial, all processes together.
     plan_first_s, plan_median_s : float array [s]
-        From the planner's question to its plan: of the first plan, and the median of all.
+        Grounding and solving: of the first plan, and the median of all.
+    plan_service_s : float array [s]
+        Of the first plan through the planner, from SA's context to the plan.
+    replan_move_s, replan_release_s : float array [s]
+        The same of the first later plan that keeps the grasp, and of the first that releases it.
     """
 
     trial: NDArray[np.str_]
@@ -40,6 +46,9 @@ class Timing:
     cpu_s: NDArray[np.float64]
     plan_first_s: NDArray[np.float64]
     plan_median_s: NDArray[np.float64]
+    plan_service_s: NDArray[np.float64]
+    replan_move_s: NDArray[np.float64]
+    replan_release_s: NDArray[np.float64]
 
     def of(self, trials: Trials, name: str) -> NDArray[np.float64]:
         """Return a column in the order of the trials, NaN for one without a row, shape (n,)."""
@@ -167,6 +176,9 @@ def _timing(cells: Cells, trials: Trials) -> Timing:
             cells.path, cells.line_of(row), "trial", str(names[row]), f"a trial of {TRIALS}"
         )
     numbers = {name: _not_negative(cells, name) for name in TIMES}
+    for name in LATER_TIMES:
+        there = name in cells.names
+        numbers[name] = _not_negative(cells, name) if there else np.full(len(names), np.nan)
     return Timing(names, **numbers)
 
 

@@ -8,12 +8,14 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from fras_experiments.results import paper, words
+from fras_experiments.results import words
 from fras_experiments.results.beside_paper import HEADER, beside_paper, conditions
 from fras_experiments.results.groups import Group, by_kind, by_point
-from fras_experiments.results.planning import Planning, paper_growth, planning_of
+from fras_experiments.results.model_error import model_error_lines
+from fras_experiments.results.planning import planning_of
+from fras_experiments.results.planning_told import planning_lines
 from fras_experiments.results.reading import Results
-from fras_experiments.results.statistics import Growth, bootstrap_interval, describe, share
+from fras_experiments.results.statistics import describe, share
 from fras_experiments.results.trials import Trials
 
 GROUP_HEADER: Final = (
@@ -42,17 +44,9 @@ def summary_lines(results: Results, figures: Mapping[str, str], *, seed: int) ->
     yield from _opening(results)
     if not len(trials):
         return
-    yield "## By scenario kind"
-    yield ""
-    yield "A: one pull. B: a later plan moves to the side. C: a later plan releases, grasps anew."
-    yield ""
-    yield from group_table(trials, by_kind(trials), seed)
-    points = by_point(trials)
-    if points:
-        yield "## By what was swept"
-        yield ""
-        yield from group_table(trials, points, seed)
-    yield from _paper(results, seed)
+    if not trials.planned_only:
+        yield from _retractions(results, seed)
+    yield from model_error_lines(trials, seed)
     planning = planning_of(results, seed=seed)
     if planning is not None:
         yield from planning_lines(planning)
@@ -67,6 +61,21 @@ def summary_lines(results: Results, figures: Mapping[str, str], *, seed: int) ->
     yield from _method(seed)
 
 
+def _retractions(results: Results, seed: int) -> Iterator[str]:
+    trials = results.trials
+    yield "## By scenario kind"
+    yield ""
+    yield "A: one pull. B: a later plan moves to the side. C: a later plan releases, grasps anew."
+    yield ""
+    yield from group_table(trials, by_kind(trials), seed)
+    points = by_point(trials)
+    if points:
+        yield "## By what was swept"
+        yield ""
+        yield from group_table(trials, points, seed)
+    yield from _paper(results, seed)
+
+
 def _opening(results: Results) -> Iterator[str]:
     trials, lost = results.trials, results.lost
     scenarios = ", ".join(f"`{name}`" for name in np.unique(trials.scenario))
@@ -74,7 +83,10 @@ def _opening(results: Results) -> Iterator[str]:
         seeds = f"{np.unique(trials.seed).size} seeds in {trials.seed.min()}..{trials.seed.max()}"
         success = share(int(trials.success.sum()), len(trials))
         yield f"{len(trials)} trials of scenario {scenarios}, {seeds}."
-        yield f"Success: {words.share(success)}."
+        if trials.planned_only:
+            yield "Each trial ends once its first plan is published: nothing is retracted."
+        else:
+            yield f"Success: {words.share(success)}."
     else:
         yield "**No trial is a result of its scene.**"
     yield ""
@@ -96,7 +108,7 @@ def _opening(results: Results) -> Iterator[str]:
     cut = int((~trials.complete).sum())
     if cut:
         yield f"- the log of {cut} trials is not whole; their numbers hold up to the cut"
-    unseen = int(np.isnan(trials.visibility).sum())
+    unseen = 0 if trials.planned_only else int(np.isnan(trials.visibility).sum())
     if unseen:
         yield f"- {unseen} trials have no visibility and are missing in its means"
     few = len(trials) < FEW
@@ -169,55 +181,6 @@ def _paper(results: Results, seed: int) -> Iterator[str]:
             "its points: they are no like for like."
         )
         yield ""
-
-
-def planning_lines(planning: Planning) -> Iterator[str]:
-    """Write the table of planning times by N."""
-    yield "## Planning time"
-    yield ""
-    rows = list[tuple[str, ...]]()
-    for n, times in planning.first_s.items():
-        ours, theirs = describe(1e3 * times, seed=0), paper.plan_s(n)
-        of_median = bootstrap_interval(1e3 * times, np.median, seed=0)
-        rows.append(
-            (
-                str(n),
-                str(ours.n),
-                f"{words.number(ours.median)} {words.interval(of_median)}",
-                f"{words.number(ours.mean)} ± {words.number(ours.sd)}",
-                words.number(ours.highest),
-                words.NONE if theirs is None else words.number(1e3 * theirs, 0),
-                words.NONE if theirs is None else words.number(1e3 * theirs / ours.median, 0),
-            )
-        )
-    yield from words.table(
-        (
-            *("N", "n", "first plan [ms]: median [95 %]", "mean ± sd", "highest"),
-            *("paper's mean [ms]", "paper / our median"),
-        ),
-        rows,
-    )
-    yield (
-        "Ours is from the planner's question to its plan, in a whole stack; the paper's is "
-        "clingo's time alone, on a 2.6 GHz Core i7. The machines differ, so that the ratio is an "
-        "order of magnitude."
-    )
-    yield ""
-    theirs = paper_growth()
-    if planning.growth is None:
-        yield "Fewer than 3 sizes N: no growth can be told."
-    else:
-        yield (
-            f"Growth with N: {growth_words(planning.growth)}. The paper's Table I: "
-            f"{growth_words(theirs)}."
-        )
-    yield ""
-
-
-def growth_words(fit: Growth) -> str:
-    """Tell a power law in words."""
-    ci = words.interval(fit.ci)
-    return f"t ∝ N^{fit.exponent:.2f}{' ' + ci if ci else ''}, R² = {fit.r_squared:.3f}"
 
 
 def _method(seed: int) -> Iterator[str]:

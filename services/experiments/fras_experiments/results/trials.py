@@ -18,11 +18,16 @@ NUMBERS: Final = (
     *("longest_above_ticks", "plans", "replans", "ticks"),
     *("grasp_x_m", "grasp_y_m", "roi_x_m", "roi_y_m", "lift_m"),
 )
+LATER: Final = ("patient_max_force_n", "missed_ticks")
+"""Numbers that tables of before have not; none of their trials had a patient."""
 NEEDED: Final = ("campaign", "seed", "scenario_kind", "complete", *TEXTS, *NUMBERS)
-KNOWN: Final = frozenset((*NEEDED, "actions", "log"))
+KNOWN: Final = frozenset(
+    (*NEEDED, *LATER, "actions", "log", "patient_above_ticks", "needless_ticks")
+)
 """Every other column is a swept field, by its dotted path."""
 KINDS: Final = ("A", "B", "C")
 SUCCESS: Final = "success"
+PLANNED: Final = "planned"
 
 
 @dataclass(frozen=True)
@@ -47,6 +52,10 @@ class Trials:
     grasp_x_m, grasp_y_m, roi_x_m, roi_y_m, lift_m : Numbers [m]
         The last block grasped and the region of interest, at rest; the largest height of the tip
         above where the last pull began.
+    patient_max_force_n : Numbers [N]
+        What the patient bore; NaN for a trial without one, as `missed_ticks`.
+    missed_ticks : Numbers
+        Ticks in which the patient bore more than the soft limit and the model did not say so.
     """
 
     campaign: str
@@ -73,6 +82,8 @@ class Trials:
     roi_x_m: Numbers
     roi_y_m: Numbers
     lift_m: Numbers
+    patient_max_force_n: Numbers
+    missed_ticks: Numbers
 
     def __len__(self) -> int:
         return len(self.trial)
@@ -81,6 +92,11 @@ class Trials:
     def success(self) -> NDArray[np.bool_]:
         """Whether each trial exposed the region of interest."""
         return self.outcome == SUCCESS
+
+    @property
+    def planned_only(self) -> bool:
+        """Whether trials were to end with their first plan, so that nothing was retracted."""
+        return bool((self.outcome == PLANNED).any())
 
     @property
     def crossed(self) -> NDArray[np.bool_]:
@@ -130,6 +146,9 @@ def trials_of(cells: Cells) -> Trials:
         )
     columns: dict[str, Any] = {name: cells.texts(name) for name in TEXTS}
     columns |= {name: cells.numbers(name) for name in NUMBERS}
+    for name in LATER:
+        there = name in cells.names
+        columns[name] = cells.numbers(name) if there else np.full(len(cells.rows), np.nan)
     _check_once(cells, columns["trial"])
     visibility = cells.numbers("visibility")
     outside = np.flatnonzero((visibility < 0.0) | (visibility > 1.0))

@@ -11,6 +11,7 @@ from fras_experiments.results.figures.force import draw_force
 from fras_experiments.results.figures.grasps import draw_grasps
 from fras_experiments.results.figures.limit import draw_limit
 from fras_experiments.results.figures.planning import draw_planning
+from fras_experiments.results.figures.twin import draw_twin
 from fras_experiments.results.reading import Results
 
 
@@ -53,7 +54,14 @@ FIGURES: Final = {
     ),
     "planning": Drawn(
         draw_planning,
-        "Planning time against N on logarithmic axes: ours (points: trials; line: power law "
-        "through the medians) and the paper's means (Table I).",
+        "Planning time against N on logarithmic axes, by f, the share that is attached: ours "
+        "(points: trials; marks: medians; line: power law through them) and the paper's means "
+        "(Table I, dashed). Beside it, where trials re-planned: B keeps the grasp, C releases it.",
+    ),
+    "twin": Drawn(
+        draw_twin,
+        "A patient besides its model: the share of scenes in which the patient bore more than the "
+        "limit and the model did not say so (with Wilson's 95 % interval), and the patient's "
+        "largest force over the one believed (points: trials; marks: medians), against stiffness.",
     ),
 }

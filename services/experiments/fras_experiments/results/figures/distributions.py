@@ -32,8 +32,10 @@ BOX: Final = 0.2
 
 
 def draw_distributions(results: Results, seed: int) -> Figure | None:
-    """Draw both; None without a trial."""
+    """Draw both; None without a trial that was to retract something."""
     trials = results.trials
+    if trials.planned_only:
+        return None
     kinds = [kind for kind in (*KINDS, "") if (trials.kind == kind).any()]
     if not kinds:
         return None
