@@ -9,6 +9,7 @@ import pytest
 
 from fras_audit.comparison import Tally, Tolerance, leaves
 from fras_common.messages import Array, HoldState, JawState, SimCheckpoint
+from fras_common.scenario import PatientSection, Scenario
 
 
 def jaw(jaw_rad: float, **header: Any) -> JawState:
@@ -108,3 +109,10 @@ def test_what_is_missing_and_what_is_too_much_are_differences() -> None:
     assert (tally.compared, tally.differences, tally.seen) == (2, 2, 1)
     assert tally.first is not None
     assert (tally.first.where, tally.first.recorded) == ("tick 3", "nothing")
+
+
+def test_a_field_that_is_left_out_equals_itself_and_nothing_else():
+    with_one = Scenario(patient=PatientSection())
+    assert list(leaves(Scenario(), Scenario())) == []
+    ((path, recorded, derived),) = leaves(Scenario(), with_one)
+    assert (path, recorded, derived) == ("patient", msgspec.UNSET, with_one.patient)

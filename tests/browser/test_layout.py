@@ -72,6 +72,8 @@ def test_each_page_looks_from_where_it_likes(
         one.reads("headline", "reaching for point")
     page.stop()
     trial.until_held("monitor")
+    # Held is said two ticks before the arms stand.
+    page.reads("stopped", "arms at rest after")
     before, still = page.scene(), other.scene()
     page.press("From above")
     eventually(

@@ -77,6 +77,8 @@ COARSE = "11,13,2"
 # A box over the block that scenario a grasps first: motion refuses it, and another is tried.
 BOXED = """\
 seed = 2
+[planner]
+criterion = "weighted"
 [[motion.forbidden_boxes]]
 lower_m = [0.085, 0.085, -0.01]
 upper_m = [0.1, 0.105, 0.02]

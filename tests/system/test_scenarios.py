@@ -101,7 +101,7 @@ def test_log_holds_every_key_that_a_trial_uses(trials: Any) -> None:
     # Written to when something is wrong, somebody stops the arms, a client leads them, or a page
     # is open.
     unused = {"log/", "fault/", "motion/holds", "monitor/presence"}
-    unused |= {topic.key for topic in TOPICS if topic.producer == "client"}
+    unused |= {topic.key for topic in TOPICS if topic.producer in ("client", "patient")}
     missing = {one for one in families - unused if not any(key.startswith(one) for key in recorded)}
     assert not missing
 

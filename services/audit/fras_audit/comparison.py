@@ -175,6 +175,10 @@ def leaves(recorded: Any, derived: Any, path: str = "") -> Iterator[Leaf]:
         yield from _dict_leaves(cast("Dict", recorded), cast("Dict", derived), path)
     elif isinstance(recorded, list | tuple) and isinstance(derived, list | tuple):
         yield from _list_leaves(cast("Row", recorded), cast("Row", derived), path)
+    elif recorded is msgspec.UNSET or derived is msgspec.UNSET:
+        # A field that is left out of the message; it has no encoding of its own.
+        if recorded is not derived:
+            yield path, recorded, derived
     elif encode(cast("object", recorded)) != encode(cast("object", derived)):
         yield path, recorded, derived
 
