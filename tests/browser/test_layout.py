@@ -87,6 +87,6 @@ def test_each_page_looks_from_where_it_likes(
         # Nearly: what the page drew first may be of a tick before the arms stood.
         now = page.scene()
         left = differing(above, now) > OTHER_PLACE_PIXELS
-        return left and differing(before, now) < differing(before, above) / 4
+        return left and differing(before, now) < differing(before, above) / 2
 
     eventually(is_back, "seen from the first place again")
