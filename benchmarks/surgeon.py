@@ -6,16 +6,16 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any, Final
-from urllib.parse import urlsplit
+from urllib.parse import urlencode, urlsplit
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, Page, Route, expect
 
 from fras_cli.link import Link
 
@@ -23,6 +23,7 @@ PATIENCE_MS: Final = 90_000.0
 SCREENS: Final = {"width": 1280, "height": 800}
 ANNOUNCED: Final = re.compile(r"the surgeon's page: (http\S+)")
 expect.set_options(timeout=PATIENCE_MS)
+SCENE: Final = re.compile(r"/scene/[^/?]+/$")
 BLANK: Final = "<!doctype html><title>not drawn</title>"
 
 
@@ -152,7 +153,11 @@ class SurgeonsPage:
         # A quarter of the pixels: they are computed, and what is read is the text.
         self.context = browser.new_context(viewport=size, device_scale_factor=sharpness)
         self.context.set_default_timeout(PATIENCE_MS)
-        if not scene:
+        if scene:
+            # viser draws fewer pixels where frames take long, and two pictures of one view differ.
+            where = {"fixedDpr": f"{sharpness:g}"}
+            self.context.route(SCENE, lambda route: _lead(route, where))
+        else:
             self.context.route("**/scene/**", lambda route: route.fulfill(body=BLANK))
         self.context.on("request", lambda request: self._places.append(request.url))
         self.page: Page = self.context.new_page()
@@ -221,6 +226,11 @@ class SurgeonsPage:
     def close(self) -> None:
         """Leave it."""
         self.context.close()
+
+
+def _lead(route: Route, query: Mapping[str, str]) -> None:
+    """Have a page ask once more, with a query."""
+    route.fulfill(status=302, headers={"Location": f"{route.request.url}?{urlencode(query)}"})
 
 
 def differing(one: NDArray[np.int16], other: NDArray[np.int16]) -> int:
