@@ -7,8 +7,9 @@ from rich.console import Console
 
 from fras_cli.display import LiveDisplay, action_line, bar, render
 from fras_cli.trial import TrialView
-from fras_common.messages import TaskStatus, Verdict
+from fras_common.messages import TaskStatus
 from fras_common.messages.planner import TaskPhase
+from support.verdicts import verdict
 
 
 def task(phase: TaskPhase, action: str = "", goal_id: str = "") -> TaskStatus:
@@ -42,24 +43,10 @@ def test_bars_stay_in_their_frame() -> None:
 
 
 def test_view_shows_force_against_limit_and_who_is_waited_for() -> None:
-    verdict = Verdict(
-        level="soft",
-        ok=False,
-        reason="force_soft",
-        max_force_n=0.51,
-        limit_n=0.5,
-        hard_limit_n=1.0,
-        visibility=0.42,
-        visible=False,
-        max_height=[],
-        force_rate_n_s=0.0,
-        crossing_tick=-1,
-        max_node_speed_m_s=0.0,
-        grasped={},
-    )
+    above = verdict(0, level="soft", reason="force_soft", max_force_n=0.51, visibility=0.42)
     view = TrialView(
         task=task("acting", "pull(psm2,b(1,6))", "g3"),
-        verdict=verdict,
+        verdict=above,
         waiting={"motion": "waiting: sim"},
     )
     output = io.StringIO()
@@ -68,7 +55,7 @@ def test_view_shows_force_against_limit_and_who_is_waited_for() -> None:
     assert "42.0%" in output.getvalue()
     assert "motion waiting: sim" in output.getvalue()
     assert "crosses" not in output.getvalue()
-    coming = msgspec.structs.replace(verdict, tick=120, crossing_tick=128)
+    coming = msgspec.structs.replace(above, tick=120, crossing_tick=128)
     Console(file=output, width=100).print(render(TrialView(verdict=coming)))
     assert "crosses its limit in about 8 ticks" in output.getvalue()
 

@@ -110,7 +110,37 @@ def test_two_setpoints_of_a_tick_bring_the_way_of_both_where_one_may_be_late() -
         else:
             assert refusal(arms.servo_jp, "psm1", turned(3)).reason == "joint_speed"
         arms.tick(held=False)
+        # No joint is faster for it: what a tick could not bring, the next one does.
+        assert joints(arms)[1] - turned(1)[1] <= JOINTS[1].speed * DT_S * (1 + 1e-9)
+        arms.tick(held=False)
         assert joints(arms) == turned(3 if late_s else 2)
+        assert not arms.moving
+
+
+def test_arms_that_allow_for_lateness_follow_no_faster_than_their_limits() -> None:
+    arms = DirectControl(
+        PARAMETERS, KINEMATICS, simulated_drivers(PARAMETERS, KINEMATICS), HOME, late_s=DT_S
+    )
+    x, y, z = HOME_TIPS_M["psm1"]
+    goal = Pose((x - 0.9 * PARAMETERS.free_speed_m_s * 0.05, y, z), DOWN)
+    arms.servo_cp("psm1", goal)
+    arms.servo_jaw("psm1", HOME["psm1"].jaw_rad - 0.03)
+    tips, ticks = [tip(arms).position_m], 0
+    while arms.moving:
+        arms.tick(held=False)
+        tips.append(tip(arms).position_m)
+        ticks += 1
+    assert ticks == 3  # 45 ms of way in ticks of 20 ms
+    assert all(dist(a, b) <= PARAMETERS.free_speed_m_s * DT_S * 1.001 for a, b in pairwise(tips))
+    assert dist(tips[-1], goal.position_m) < 1e-9
+    assert arms.snapshot(held=False)["psm1"].jaw_rad == HOME["psm1"].jaw_rad - 0.03
+    # A hold on the way drops the rest of it.
+    arms.servo_cp("psm1", Pose((x, y, z), DOWN))
+    arms.tick(held=False)
+    stands = joints(arms)
+    arms.tick(held=True)
+    arms.tick(held=False)
+    assert joints(arms) == stands
 
 
 def test_jaw_and_joints_of_one_tick_are_both_followed(arms: DirectControl) -> None:

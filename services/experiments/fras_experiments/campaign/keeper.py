@@ -307,7 +307,7 @@ def _cpu_s() -> float:
     for one in (me, *me.children(recursive=True)):
         try:
             times = one.cpu_times()
-        except psutil.Error:
-            continue
+        except psutil.NoSuchProcess:
+            continue  # it has ended meanwhile
         total_s += times.user + times.system
     return total_s

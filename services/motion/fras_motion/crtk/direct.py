@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from math import dist
 
 from fras_motion.course import Course
 from fras_motion.drivers import Driver, Measured, Setpoint
-from fras_motion.kinematics import ArmKinematics, Instrument, Joints, Pose, Unreachable
+from fras_motion.kinematics import JOINTS, ArmKinematics, Instrument, Joints, Pose, Unreachable
 from fras_motion.parameters import MotionParameters
 from fras_motion.rehearsal import rehearse
 from fras_motion.safety import GATES, Gate, GateRefused, Step
@@ -42,6 +43,7 @@ class _Arm:
     measured: Measured
     wanted: Setpoint | None = None
     course: Course | None = None
+    is_fresh: bool = False
     ticks_since_servo: int = 1000
 
 
@@ -57,8 +59,9 @@ class DirectControl:
     gates : mapping of str to Gate, optional
         What each setpoint has to pass.
     late_s : float, optional
-        How late a setpoint may come. The next one, in time, comes with it in one tick and brings
-        the way of both.
+        How late a setpoint may come: the next one, in time, comes with it in one tick and brings
+        the way of both. Arms that allow for it go to a setpoint no faster than their limits; others
+        are there with the next tick.
     """
 
     def __init__(
@@ -236,7 +239,7 @@ class DirectControl:
         elapsed_s = min(since_s, max(_LONGEST_STEP_S, dt_s))
         with _named(name, command):
             self._check(arm, goal, elapsed_s)
-        arm.wanted = goal
+        arm.wanted, arm.is_fresh = goal, True
 
     def _advance(self, arm: _Arm, *, halted: bool) -> None:
         if halted:
@@ -250,7 +253,27 @@ class DirectControl:
             if progress.ending is not None or arm.course.stopped:
                 arm.course = None
         elif arm.wanted is not None:
-            arm.setpoint, arm.wanted, arm.ticks_since_servo = arm.wanted, None, 0
+            if arm.is_fresh:
+                arm.is_fresh, arm.ticks_since_servo = False, 0
+            share = self._share(arm, arm.wanted) if self._late_s else 1.0
+            if share < 1.0:
+                arm.setpoint = _between(arm.setpoint, arm.wanted, share)
+            else:
+                arm.setpoint, arm.wanted = arm.wanted, None
+
+    def _share(self, arm: _Arm, wanted: Setpoint) -> float:
+        """Share of the way to a setpoint that one tick may bring, at most 1."""
+        now, dt_s = arm.setpoint, self._parameters.dt_s
+        tips = (arm.kinematics.forward(one.joints).position_m for one in (now, wanted))
+        needed_s = (
+            *(
+                abs(b - a) / joint.speed
+                for joint, a, b in zip(JOINTS, now.joints, wanted.joints, strict=True)
+            ),
+            abs(wanted.jaw_rad - now.jaw_rad) / self._bounds.jaw_speed_rad_s,
+            dist(*tips) / self._bounds.speed_m_s,
+        )
+        return min(1.0, dt_s / max(dt_s, *needed_s))
 
     def _check(self, arm: _Arm, after: Setpoint, dt_s: float) -> None:
         kinematics = arm.kinematics
@@ -291,6 +314,12 @@ def shown(status: ArmStatus, *, held: bool) -> str:
 def _instrument(arm: _Arm, setpoint: Setpoint) -> Instrument:
     tip = arm.kinematics.forward(setpoint.joints)
     return arm.kinematics.instrument(setpoint.joints, tip)
+
+
+def _between(start: Setpoint, end: Setpoint, share: float) -> Setpoint:
+    a, b, c, d, e, f = (p + share * (q - p) for p, q in zip(start.joints, end.joints, strict=True))
+    jaw_rad = start.jaw_rad + share * (end.jaw_rad - start.jaw_rad)
+    return Setpoint((a, b, c, d, e, f), jaw_rad)
 
 
 def _goal(arm: _Arm) -> Setpoint:
