@@ -49,8 +49,7 @@ def test_what_comes_while_nothing_is_open_does_not_pile_up(tmp_path: Path):
     writing.end()
 
 
-def test_what_publishers_cached_finds_room_while_a_log_is_taken_up(tmp_path: Path):
-    """They send it to a new subscriber, too, and what is said meanwhile comes behind it."""
+def test_what_is_said_while_a_log_is_taken_up_finds_room(tmp_path: Path):
     posted: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
     facts: list[Any] = []
     writing = Writing(posted.put, nothing, nothing, nothing)
@@ -100,7 +99,7 @@ def test_so_is_one_from_a_cache(tmp_path: Path, trial: str, kept: list[int]):
 def test_an_early_sample_of_another_trial_is_known_by_its_number(
     tmp_path: Path, trial: str, kept: list[int]
 ):
-    """Zenoh sends a new subscriber what is cached; the publisher's clock may have been ahead."""
+    """Whom the recorder hears first is asked for its past; its clock may have been ahead then."""
     posted: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
     facts: list[Any] = []
     writing = Writing(posted.put, nothing, nothing, nothing)

@@ -19,7 +19,7 @@ FLUSH_S = 0.5
 # What waits to be written: so many messages or bytes; what comes then is lost, and told.
 PLACES = 10_000
 BYTES = 256 * 2**20
-# While a log is taken up: publishers send a new subscriber all that they cache, a thousand a key.
+# While a log is taken up, for which caches are asked up to 20 s: what is said meanwhile waits.
 PLACES_EARLY = 100_000
 # Of either: motion is told to wait. Four seconds of a trial at pace 1.
 BEHIND = 0.25
