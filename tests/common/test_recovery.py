@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from fras_common.bus import RawSample
 from fras_common.bus.past import Cached
 from fras_common.bus.recovery import (
-    FIRST,
+    ALL_OF_WHO_BEGINS,
     GIVE_UP_S,
     PATIENCE_S,
     PUBLISHERS,
@@ -17,6 +17,7 @@ from fras_common.bus.recovery import (
     WAITING,
     WAITING_BYTES,
     Ask,
+    Earlier,
     Recovery,
 )
 from fras_common.keeping import kept_of
@@ -33,9 +34,9 @@ def numbered(number: int, publisher: str = ONE, key: str = VERDICTS, size: int =
 class Wire:
     """One that listens; what is said to it may be lost, and caches answer when they are told to."""
 
-    def __init__(self) -> None:
+    def __init__(self, earlier: Earlier = ALL_OF_WHO_BEGINS) -> None:
         self.now_s = 100.0
-        self.recovery = Recovery(lambda: self.now_s)
+        self.recovery = Recovery(lambda: self.now_s, earlier)
         self.now_s += SETTLING_S
 
     def say(self, *numbers: int, publisher: str = ONE, key: str = VERDICTS) -> None:
@@ -52,10 +53,17 @@ class Wire:
         self.now_s = max(self.now_s, due_s)
         return self.recovery.questions()
 
-    def answer(self, ask: Ask, highest: int, publisher: str = ONE, key: str = VERDICTS) -> None:
-        """Answer as a cache does that holds all up to a number."""
+    def answer(
+        self,
+        ask: Ask,
+        highest: int,
+        publisher: str = ONE,
+        key: str = VERDICTS,
+        lost: frozenset[int] = frozenset(),
+    ) -> None:
+        """Answer as a cache does that holds all up to a number, but for what is lost on the way."""
         for number in asked_for(ask):
-            if highest - kept_of(key) < number <= highest:
+            if number not in lost and highest - kept_of(key) < number <= highest:
                 ask.found.append(numbered(number, publisher, key))
         self.recovery.answered(ask)
 
@@ -131,7 +139,7 @@ def test_who_was_there_before_is_heard_from_now_on_and_who_comes_later_from_the_
     assert list(asked_for(ask)) == [0, 1, 2]
     wire.recovery.note_latest(VERDICTS, "d/1", 900)
     (ask,) = wire.asks()
-    assert list(asked_for(ask)) == list(range(901 - FIRST, 901))
+    assert list(asked_for(ask)) == list(range(901 - ALL_OF_WHO_BEGINS.of_who_comes, 901))
 
 
 def test_of_a_short_cache_nothing_is_waited_for_that_it_cannot_hold():
@@ -164,13 +172,57 @@ def test_what_a_cache_holds_no_more_is_passed_over_at_once():
     assert wire.told() == [0, 5, *range(11, kept + 11)]
 
 
-def test_a_cache_that_begins_later_says_what_is_gone():
+def test_what_an_answer_lost_on_its_way_is_asked_for_again():
     wire = Wire()
     wire.say(0, 9)
     (ask,) = wire.asks()
-    ask.found.extend(numbered(number) for number in (6, 7, 8))
+    ask.found.extend(numbered(number) for number in (3, 6, 7))
     wire.recovery.answered(ask)
-    assert wire.told() == [0, 6, 7, 8, 9]
+    assert wire.told() == [0]
+    (ask,) = wire.asks()
+    assert list(asked_for(ask)) == [1, 2]
+    wire.answer(ask, 9)
+    (ask,) = wire.asks()
+    assert list(asked_for(ask)) == [4, 5]
+    wire.answer(ask, 9)
+    (ask,) = wire.asks()
+    wire.answer(ask, 9)
+    assert wire.told() == list(range(10))
+
+
+def test_a_latched_key_tells_its_latest_whoever_came_first():
+    wire = Wire(Earlier(1, 1))
+    wire.recovery.note_earlier(numbered(5))
+    wire.recovery.note_earlier(numbered(5))
+    wire.recovery.note_latest(VERDICTS, ONE, 5)
+    assert wire.told() == [5]
+    assert wire.asks() == []
+    # One that begins later, and of which only the heartbeat is heard.
+    wire.recovery.note_latest(VERDICTS, OTHER, 9)
+    (ask,) = wire.asks()
+    assert list(asked_for(ask)) == [9]
+    wire.answer(ask, 9, publisher=OTHER)
+    assert wire.told() == [5, 9]
+
+
+def test_what_is_said_meanwhile_is_not_told_behind_what_was_said_before():
+    wire = Wire(Earlier(1, 1))
+    wire.say(6)
+    wire.recovery.note_earlier(numbered(5))
+    wire.say(8)
+    wire.recovery.note_earlier(numbered(7))
+    assert wire.told() == [6, 7, 8]
+
+
+def test_where_nothing_of_before_is_wanted_nothing_is_asked_for():
+    wire = Wire(Earlier(0, 0))
+    wire.recovery.note_latest(VERDICTS, ONE, 5)
+    wire.say(9, publisher=OTHER)
+    assert wire.told() == [9]
+    assert wire.asks() == []
+    wire.say(7)
+    (ask,) = wire.asks()
+    assert list(asked_for(ask)) == [6]
 
 
 def test_who_does_not_answer_is_asked_again_and_given_up_in_time():
@@ -243,7 +295,9 @@ def test_whatever_is_lost_all_is_told_in_order_and_once(data: st.DataObject):
             open_asks.append((ask, ONE if ONE in ask.selector else OTHER))
         if open_asks and data.draw(st.booleans()):
             ask, of = open_asks.pop(data.draw(st.integers(0, len(open_asks) - 1)))
-            wire.answer(ask, said[of] - 1, of)
+            wire.answer(
+                ask, said[of] - 1, of, lost=frozenset(data.draw(st.sets(st.integers(0, 40))))
+            )
     # At last the network is good again.
     for publisher, count in said.items():
         wire.recovery.note_latest(VERDICTS, publisher, count - 1)

@@ -9,6 +9,7 @@ import uuid
 from collections.abc import Callable, Iterator
 from typing import Any
 
+import psutil
 import pytest
 
 from fras_common.bus import BusClosed, Call, RemoteFault
@@ -24,6 +25,8 @@ SIM_LOG = LOG.of(service="sim")
 # More than all buffers on the way hold, and less than a publisher keeps.
 BIG = "x" * 60_000
 FROZEN_PUTS = 900
+# For so long Zenoh waits for one who takes in nothing, before it breaks the link.
+LINK_HELD_S = 6.0
 
 LISTENER = """
 import sys, threading
@@ -47,6 +50,18 @@ print("subscribed", flush=True)
 done.wait(60)
 print(seqs == list(range(seqs[0], seqs[0] + len(seqs))), seqs[-1], flush=True)
 bus.close()
+"""
+
+
+# Asks for all that a cache holds, as the bus does, and stands still as the first of it comes.
+FREEZES = """
+import os, signal, sys, threading
+from fras_common.bus.zenoh_bus import ZenohBus
+bus = ZenohBus(sys.argv[1], sys.argv[2], "sa/frozen")
+def freeze(*_):
+    os.kill(os.getpid(), signal.SIGSTOP)
+bus._get_cached("log/sim/@adv/pub/**", freeze, freeze, 30.0)
+threading.Event().wait(60)
 """
 
 
@@ -115,6 +130,58 @@ def test_a_frozen_subscriber_blocks_nobody_and_misses_nothing(
         process.send_signal(signal.SIGCONT)
         hearing.close()
         publishing.close()
+
+
+@pytest.fixture
+def frozen(router: Any) -> Iterator[Callable[[str], subprocess.Popen[bytes]]]:
+    begun: list[subprocess.Popen[bytes]] = []
+
+    def begin(cell: str) -> subprocess.Popen[bytes]:
+        begun.append(subprocess.Popen([sys.executable, "-c", FREEZES, cell, router.endpoint]))
+        return begun[-1]
+
+    yield begin
+    for process in begun:
+        with process:
+            process.kill()
+
+
+def stands_still(process: subprocess.Popen[bytes]) -> bool:
+    return psutil.Process(process.pid).status() == psutil.STATUS_STOPPED
+
+
+def test_who_freezes_as_a_cache_answers_blocks_nobody(
+    router: Any, frozen: Callable[[str], subprocess.Popen[bytes]], listen: Listen
+):
+    """A cache holds back its publisher's puts while it answers."""
+    cell, heard = f"frozen-{uuid.uuid4().hex[:6]}", listen()
+    hearing = ZenohBus(cell, router.endpoint, "sa/1")
+    publishing = ZenohBus(cell, router.endpoint, "sim/1")
+    try:
+        publisher = publishing.publisher(SIM_LOG)
+        for _ in range(FROZEN_PUTS):
+            publisher.put(LogRecord(level="", event="big", fields={"data": BIG}))
+        hearing.subscribe(SIM_LOG, heard)
+        asker = frozen(cell)
+        assert longest_way(publisher, heard, lambda: stands_still(asker)) < 1.0
+    finally:
+        hearing.close()
+        publishing.close()
+
+
+def longest_way(publisher: Any, heard: Any, stands: Callable[[], bool]) -> float:
+    """Put until one has stood still for as long as Zenoh would wait for it; tell the worst [s]."""
+    worst, since = 0.0, None
+    deadline = time.monotonic() + 30.0
+    while since is None or time.monotonic() < since + LINK_HELD_S:
+        assert time.monotonic() < deadline, "nothing froze"
+        begun = time.monotonic()
+        last = publisher.put(LogRecord(level="", event="small", fields={}))
+        heard.until(lambda got, last=last: bool(got) and got[-1].seq == last.seq, timeout_s=20.0)
+        worst = max(worst, time.monotonic() - begun)
+        if since is None and stands():
+            since = time.monotonic()
+    return worst
 
 
 def test_after_a_router_restart_nothing_the_cache_holds_is_lost(own_router: Any, listen: Listen):

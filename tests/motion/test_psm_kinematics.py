@@ -201,10 +201,12 @@ def test_shaft_always_passes_the_remote_centre(joints, name):
 
 
 @given(st.tuples(*(st.floats(-1, 1),) * 4).filter(lambda q: sum(x * x for x in q) > 0.01))
+@example(values=(0.0, 1.0, 0.25, -1.0))  # two are the largest
 @settings(max_examples=200, deadline=None)
 def test_quaternion_and_matrix_are_inverses(values):
     norm = np.sqrt(sum(x * x for x in values))
     unit = np.array(values) / norm
     back = np.array(quaternion(matrix(tuple(unit.tolist()))))
-    assert back[np.abs(back).argmax()] > 0
+    largest = np.abs(back) > np.abs(back).max() - 1e-12
+    assert back[largest].max() > 0
     np.testing.assert_allclose(back * np.sign(back @ unit), unit, atol=1e-12)

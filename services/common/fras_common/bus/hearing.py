@@ -1,12 +1,12 @@
-"""Who listens to everything, without losses: asks caches for what did not arrive."""
+"""Who listens without losses: asks caches for what did not arrive."""
 
 import threading
 import time
 from collections.abc import Callable
 
 from fras_common.bus.contract import RawSample
-from fras_common.bus.past import Cached, Get
-from fras_common.bus.recovery import Ask, Recovery
+from fras_common.bus.past import Cached, Get, latest_selector
+from fras_common.bus.recovery import Ask, Earlier, Recovery
 
 __all__ = ["Hearing"]
 
@@ -23,12 +23,15 @@ class Hearing:
         Asks a cache; may call back on any thread.
     callback : callable
         Gets the samples, one at a time, on any thread.
+    earlier : Earlier
+        What it gets of what was said before.
     """
 
-    def __init__(self, get: Get, callback: Callable[[RawSample], None]) -> None:
+    def __init__(self, get: Get, callback: Callable[[RawSample], None], earlier: Earlier) -> None:
         self._get = get
         self._callback = callback
-        self._recovery = Recovery(time.monotonic)
+        self._earlier = earlier
+        self._recovery = Recovery(time.monotonic, earlier)
         self._is_closed = False
         self._is_telling = False
         self._due_s: float | None = None
@@ -54,6 +57,17 @@ class Hearing:
         with self._changed:
             self._recovery.note_latest(key, publisher, number)
             self._look()
+
+    def ask_latest(self, key_expr: str) -> None:
+        """Ask who is there for what is to be told of before, sooner than their next heartbeat."""
+        if self._earlier.of_who_was_there > 0:
+            self._get(latest_selector(key_expr), self._note_earlier, lambda: None, ANSWER_S)
+
+    def _note_earlier(self, found: Cached) -> None:
+        with self._changed:
+            self._recovery.note_earlier(found)
+            self._look()
+        self._tell()
 
     def undeclare(self) -> None:
         """Ask no more."""

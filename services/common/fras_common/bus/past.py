@@ -16,7 +16,7 @@ from typing import Final
 from fras_common.bus.contract import RawSample
 from fras_common.keeping import kept_of
 
-__all__ = ["CACHES", "Cached", "Get", "Past", "cache_selector", "piece_length"]
+__all__ = ["CACHES", "Cached", "Get", "Past", "cache_selector", "latest_selector", "piece_length"]
 
 CACHES: Final = "/@adv/pub/"
 """Between the key and `<session>/<entity>` of an advanced publisher: where it answers for its
@@ -28,7 +28,7 @@ AT_ONCE: Final = 4
 PIECE_SHARE: Final = 0.25
 """Of the whole time: a publisher that is frozen must not use it up for all."""
 TRIES: Final = 2
-"""How often is asked what nobody answers, or somebody not in time."""
+"""How often is asked what gives nothing new, or what somebody has not answered in time."""
 EARLIEST_S: Final = 0.1
 """The least that a question may take; the library takes none for without end."""
 
@@ -53,8 +53,10 @@ class Cached:
 @dataclass
 class _Piece:
     selector: str
+    missing: int = 0
     tries: int = 0
-    count: int = 0
+    has_come: bool = False
+    """Whether the latest try gave anything new."""
 
 
 Get = Callable[[str, Callable[[Cached], None], Callable[[], None], float], None]
@@ -98,36 +100,41 @@ class Past:
 
     def ask(self, key_expr: str) -> None:
         """Begin."""
-        self._ask_first(_Piece(f"{key_expr}{CACHES}**?_max=1"))
+        self._ask_first(_Piece(latest_selector(key_expr)))
 
     def _ask_first(self, first: _Piece) -> None:
-        first.tries += 1
         by_s = self._clock_s() + self._piece_s - EARLIEST_S
-        self._ask(first, partial(self._begin, first, by_s), self._piece_s)
+        self._ask(first, partial(self._begin, first, len(self._found), by_s))
 
-    def _begin(self, first: _Piece, by_s: float) -> None:
-        if self._clock_s() >= by_s and first.tries < TRIES:
-            # Somebody has not answered in time.
+    def _begin(self, first: _Piece, known: int, by_s: float) -> None:
+        is_late = self._clock_s() >= by_s and first.tries < TRIES
+        if self._left_s() > 0.0 and (is_late or len(self._found) > known):
+            # Somebody has not answered in time, or may have found the link too full.
             self._ask_first(first)
             return
         with self._lock:
             latest = [max(found.items())[1] for found in self._found.values()]
-            self._pieces.extend(_Piece(one) for each in latest for one in pieces_before(each))
+            self._pieces.extend(one for each in latest for one in pieces_before(each))
         self._go_on()
 
-    def _ask(self, piece: _Piece, on_end: Callable[[], None], allowed_s: float) -> None:
+    def _ask(self, piece: _Piece, on_end: Callable[[], None]) -> None:
         def note(one: Cached) -> None:
             with self._lock:
-                piece.count += 1
-                self._found[one.sample.key, one.publisher][one.number] = one
+                found = self._found[one.sample.key, one.publisher]
+                piece.missing -= one.number not in found
+                piece.has_come |= one.number not in found
+                found[one.number] = one
 
+        piece.tries += 1
+        piece.has_come = False
+        allowed_s = min(self._piece_s, max(self._left_s(), EARLIEST_S))
         self._get(piece.selector, note, on_end, allowed_s)
 
     def _end(self, piece: _Piece) -> None:
         with self._lock:
             self._under_way -= 1
-            if piece.count == 0 and piece.tries < TRIES:
-                # A publisher that was too busy to answer in time may do so now.
+            if piece.missing > 0 and (piece.has_come or piece.tries < TRIES):
+                # A publisher that was too busy, or a link that was too full, may do it now.
                 self._pieces.append(piece)
         self._go_on()
 
@@ -141,9 +148,7 @@ class Past:
                 self._under_way += 1
             is_done = self._under_way == 0
         for piece in following:
-            piece.tries += 1
-            allowed_s = min(self._piece_s, max(self._left_s(), EARLIEST_S))
-            self._ask(piece, partial(self._end, piece), allowed_s)
+            self._ask(piece, partial(self._end, piece))
         if is_done:
             self._finish()
 
@@ -155,12 +160,18 @@ class Past:
         return self._by_s - self._clock_s()
 
 
-def pieces_before(latest: Cached) -> Iterator[str]:
-    """Tell the selectors of what a publisher may have cached before its latest sample."""
+def latest_selector(key_expr: str) -> str:
+    """Tell where each advanced publisher answers with its latest sample."""
+    return f"{key_expr}{CACHES}**?_max=1"
+
+
+def pieces_before(latest: Cached) -> Iterator[_Piece]:
+    """Tell the pieces of what a publisher may have cached before its latest sample."""
     key, end = latest.sample.key, latest.number
     step = piece_length(len(latest.sample.payload))
     for first in range(max(0, end + 1 - kept_of(key)), end, step):
-        yield cache_selector(key, latest.publisher, first, min(first + step, end) - 1)
+        last = min(first + step, end) - 1
+        yield _Piece(cache_selector(key, latest.publisher, first, last), last + 1 - first)
 
 
 def piece_length(payload_bytes: int) -> int:

@@ -13,7 +13,7 @@ from fras_common.bus.contract import RawSample
 from fras_common.bus.past import Cached, cache_selector, piece_length
 from fras_common.keeping import kept_of
 
-__all__ = ["Ask", "Recovery"]
+__all__ = ["ALL_OF_WHO_BEGINS", "Ask", "Earlier", "Recovery"]
 
 PATIENCE_S: Final = 0.02
 """What is missing may be just behind."""
@@ -22,13 +22,31 @@ GIVE_UP_S: Final = 2.5
 """A publisher that has gone does not answer; less than a log waits for as it is closed."""
 SETTLING_S: Final = 1.0
 """Who is heard first so soon has spoken before; who is heard first later has just begun."""
-FIRST: Final = 64
-"""What a publisher that has just begun may have said unheard."""
 WAITING: Final = 1000
 """What waits behind a hole, by publisher."""
 WAITING_BYTES: Final = 64 * 2**20
 """Of all publishers together."""
 PUBLISHERS: Final = 4096
+
+
+@dataclass(frozen=True)
+class Earlier:
+    """How many messages of a publisher are told that it said before it was heard.
+
+    Attributes
+    ----------
+    of_who_was_there : int
+        Of one that is heard within the first second.
+    of_who_comes : int
+        Of one that is heard later.
+    """
+
+    of_who_was_there: int
+    of_who_comes: int
+
+
+ALL_OF_WHO_BEGINS: Final = Earlier(0, 64)
+"""From now on, and what a publisher that has just begun may have said unheard."""
 
 
 @dataclass
@@ -63,6 +81,8 @@ class Recovery:
     ----------
     clock_s : callable
         Monotonic.
+    earlier : Earlier
+        What is told of before.
 
     Attributes
     ----------
@@ -77,9 +97,10 @@ class Recovery:
     words behind a high number.
     """
 
-    def __init__(self, clock_s: Callable[[], float]) -> None:
+    def __init__(self, clock_s: Callable[[], float], earlier: Earlier = ALL_OF_WHO_BEGINS) -> None:
         self.told: deque[RawSample] = deque()
         self._clock_s = clock_s
+        self._earlier = earlier
         self._settled_s = clock_s() + SETTLING_S
         self._streams: OrderedDict[tuple[str, str], _Stream] = OrderedDict()
         self._holes: dict[tuple[str, str], _Stream] = {}
@@ -88,7 +109,7 @@ class Recovery:
     def note(self, heard: Cached) -> None:
         """Take in what a publisher has just said."""
         number, sample = heard.number, heard.sample
-        stream = self._stream(sample.key, heard.publisher, number, number - 1)
+        stream = self._stream(sample.key, heard.publisher, number, at_least=1)
         stream.size = len(sample.payload)
         stream.highest = max(stream.highest, number)
         if number <= stream.last:
@@ -99,9 +120,15 @@ class Recovery:
             _pass_over(stream)
         self._tell(stream)
 
+    def note_earlier(self, found: Cached) -> None:
+        """Take in what a cache had without being asked for a hole."""
+        stream = self._stream(found.sample.key, found.publisher, found.number, at_least=1)
+        if found.number > stream.last:
+            self.note(found)
+
     def note_latest(self, key: str, publisher: str, number: int) -> None:
         """Take in which number was a publisher's latest."""
-        stream = self._stream(key, publisher, number, number)
+        stream = self._stream(key, publisher, number)
         if number > stream.highest:
             stream.highest = number
             self._tell(stream)
@@ -132,22 +159,22 @@ class Recovery:
             if one.number > stream.last:
                 self._wait(stream, one)
         if ask.found:
-            # What is older than the oldest of a cache is not to be had.
-            stream.last = max(stream.last, min(one.number for one in ask.found) - 1)
+            # Even a part of it: what a link was too full for may come the next time.
             stream.since_s = None
         elif stream.since_s is not None and now_s - stream.since_s >= GIVE_UP_S:
             _pass_over(stream)
         self._tell(stream, in_s=0.0 if ask.found else RETRY_S, anew=True)
 
-    def _stream(self, key: str, publisher: str, number: int, before: int) -> _Stream:
-        """Find a publisher; of a new one all up to `before` is taken as told."""
+    def _stream(self, key: str, publisher: str, number: int, *, at_least: int = 0) -> _Stream:
+        """Find a publisher; of a new one at least so many messages up to `number` are told."""
         name = (key, publisher)
         if (stream := self._streams.get(name)) is not None:
             self._streams.move_to_end(name)
             return stream
         kept = kept_of(key)
-        if self._clock_s() >= self._settled_s:
-            before = max(-1, number - min(kept, FIRST))
+        is_settled = self._clock_s() >= self._settled_s
+        earlier = self._earlier.of_who_comes if is_settled else self._earlier.of_who_was_there
+        before = max(-1, number - max(at_least, min(kept, earlier)))
         stream = self._streams[name] = _Stream(key, publisher, before, before, kept)
         if len(self._streams) > PUBLISHERS:
             _, forgotten = self._streams.popitem(last=False)

@@ -2,6 +2,8 @@
 
 QoS, measured on this stack: a blocking congestion policy lets one frozen subscriber stop every
 put for seconds; dropping with recovery from the publisher's cache loses nothing and never blocks.
+A reply has the policy and the priority of its question, and a publisher's cache holds back its puts
+while it replies: who asks a cache lets it drop, and asks again.
 """
 
 # The wheel's stubs leave handler types open.
@@ -25,6 +27,7 @@ from fras_common.bus.contract import (
 )
 from fras_common.bus.hearing import Hearing
 from fras_common.bus.past import CACHES, Cached, Past
+from fras_common.bus.recovery import ALL_OF_WHO_BEGINS, Earlier
 from fras_common.bus.settings import NoRouter, client_settings
 from fras_common.bus.shared import Answer, Stamper, received, wait_for
 from fras_common.bus.zenoh_wire import ENCODING, ZenohCall, configured, numbered, outcome, raw
@@ -43,9 +46,11 @@ HEARTBEAT_S = 0.1
 # A publisher's latest number, as four bytes.
 BEAT_BYTES = 4
 TOKENS = ("alive/**", "ready/**")
+# What a subscriber that begins later, or hears of a publisher later, gets of what was said before.
+EARLIER = {Qos.STATE: Earlier(0, 0), Qos.EVENT: Earlier(1, 1)}
 # What was said before gives way to what is said now, health above all.
 _REPLIES = zenoh.ext.RepliesConfig(
-    congestion_control=zenoh.CongestionControl.BLOCK, priority=zenoh.Priority.DATA_LOW
+    congestion_control=zenoh.CongestionControl.DROP, priority=zenoh.Priority.DATA_LOW
 )
 
 
@@ -135,11 +140,10 @@ class ZenohBus:
                 reliability=zenoh.Reliability.RELIABLE,
                 priority=zenoh.Priority.REAL_TIME,
                 express=True,
-                cache=zenoh.ext.CacheConfig(kept_of(key), replies_config=_REPLIES),
+                cache=zenoh.ext.CacheConfig(kept_of(key)),
                 sample_miss_detection=zenoh.ext.MissDetectionConfig(
                     heartbeat=HEARTBEAT_S, sporadic_heartbeat=None
                 ),
-                publisher_detection=True,
             )
         self._declared.append(declared)
         return declared
@@ -153,26 +157,29 @@ class ZenohBus:
     def subscribe(self, topic: Topic[M], callback: Callable[[M], None]) -> None:
         """Receive every message of a key or family."""
 
-        def deliver(sample: zenoh.Sample) -> None:
+        def deliver(sample: RawSample) -> None:
             try:
-                message = received(topic, sample.payload.to_bytes(), str(sample.key_expr))
+                message = received(topic, sample.payload, sample.key)
             except MalformedMessage as error:
                 self._on_malformed(error)
             else:
                 callback(message)
 
-        history = zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=1)
-        self._subscribe(
-            topic.wildcard,
-            deliver,
-            history=history if topic.qos is Qos.EVENT else None,
-            recover=topic.qos in (Qos.STATE, Qos.EVENT),
+        if (earlier := EARLIER.get(topic.qos)) is not None:
+            self._hear(topic.wildcard, deliver, earlier)
+            return
+        self.require_open()
+        self._declared.append(
+            self._session.declare_subscriber(topic.wildcard, lambda sample: deliver(raw(sample)))
         )
 
     def subscribe_raw(self, key_expr: str, callback: Callable[[RawSample], None]) -> None:
         """Receive samples undecoded, from now on."""
+        self._hear(key_expr, callback, ALL_OF_WHO_BEGINS)
+
+    def _hear(self, key_expr: str, callback: Callable[[RawSample], None], earlier: Earlier) -> None:
         self.require_open()
-        hearing = Hearing(self._get_cached, callback)
+        hearing = Hearing(self._get_cached, callback, earlier)
 
         def note(sample: zenoh.Sample) -> None:
             if (heard := numbered(sample)) is not None:
@@ -191,25 +198,7 @@ class ZenohBus:
         self._declared.append(hearing)
         for key, tell in ((key_expr, note), (f"{key_expr}{CACHES}**", note_latest)):
             self._declared.append(self._session.declare_subscriber(key, tell))
-
-    def _subscribe(
-        self,
-        key_expr: str,
-        deliver: Callable[[zenoh.Sample], None],
-        history: zenoh.ext.HistoryConfig | None,
-        recover: bool,
-    ) -> None:
-        self.require_open()
-        recovery = zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True)
-        self._declared.append(
-            zenoh.ext.declare_advanced_subscriber(
-                self._session,
-                key_expr,
-                deliver,
-                history=history,
-                recovery=recovery if recover else None,
-            )
-        )
+        hearing.ask_latest(key_expr)
 
     def cached(
         self, key_expr: str, on_done: Callable[[list[RawSample]], None], timeout_s: float
@@ -236,6 +225,9 @@ class ZenohBus:
                 target=zenoh.QueryTarget.ALL,
                 consolidation=zenoh.ConsolidationMode.NONE,
                 accept_replies=zenoh.ReplyKeyExpr.ANY,
+                # What was said before gives way to what is said now, health above all.
+                congestion_control=zenoh.CongestionControl.DROP,
+                priority=zenoh.Priority.DATA_LOW,
                 timeout=timeout_s,
             )
         except zenoh.ZError:
