@@ -82,7 +82,7 @@ class MonitorService:
         )
         self.address = door.address
         announce(self.address)
-        # The host's own thread draws from here on; that of the server, on which a stop comes, is there.
+        # The host's own thread draws; the server's, on which a stop comes, is there already.
         give_way()
 
     def _on_command(self, command: AnyCommand) -> None:
