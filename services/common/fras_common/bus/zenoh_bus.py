@@ -29,7 +29,7 @@ from fras_common.bus.hearing import Hearing
 from fras_common.bus.past import CACHES, Cached, Past
 from fras_common.bus.recovery import ALL_OF_WHO_BEGINS, Earlier
 from fras_common.bus.settings import NoRouter, client_settings
-from fras_common.bus.shared import Answer, Stamper, received, wait_for
+from fras_common.bus.shared import Answer, Newest, Stamper, received, wait_for
 from fras_common.bus.zenoh_wire import ENCODING, ZenohCall, configured, numbered, outcome, raw
 from fras_common.codec import MalformedMessage, decode, encode
 from fras_common.errors import FrasError
@@ -172,6 +172,20 @@ class ZenohBus:
         self._declared.append(
             self._session.declare_subscriber(topic.wildcard, lambda sample: deliver(raw(sample)))
         )
+
+    def latest(self, topic: Topic[M]) -> Newest[M]:
+        """Look at a concrete key now and then; Zenoh keeps one, and wakes nobody."""
+        self.require_open()
+        ring = cast(Any, zenoh.handlers.RingChannel(1))
+        declared: Any = self._session.declare_subscriber(topic.key, ring)
+        self._declared.append(declared)
+
+        def fetch() -> RawSample | None:
+            if self._closed or (sample := declared.try_recv()) is None:
+                return None
+            return raw(sample)
+
+        return Newest(topic, fetch, self._on_malformed)
 
     def subscribe_raw(self, key_expr: str, callback: Callable[[RawSample], None]) -> None:
         """Receive samples undecoded, from now on."""
