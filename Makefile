@@ -83,7 +83,7 @@ reference: $(VENV)/.installed-dev ## make the pages of docs/ anew that are made 
 	$(BIN)/python -m manual
 
 docs: $(VENV)/.installed-dev ## build the documentation as a site in build/site/
-	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
 
 screenshots: $(VENV)/.installed-dev browser ## take the pictures of docs/tour.md anew
 	$(BIN)/python -m benchmarks.page_pictures
