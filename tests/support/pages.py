@@ -4,6 +4,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 
 from markdown_it import MarkdownIt
@@ -55,8 +56,18 @@ def anchors(page: Path) -> set[str]:
     """Names of a page's headings, as GitHub and the site make them."""
     found = set[str]()
     stream = tokens(page)
-    for opening, inline in zip(stream, stream[1:], strict=False):
+    for opening, inline in pairwise(stream):
         if opening.type == "heading_open":
             said = "".join(child.content for child in inline.children or [])
             found.add(re.sub(r"[^\w\- ]", "", said.lower()).replace(" ", "-"))
     return found
+
+
+def spans(page: Path) -> list[str]:
+    """Code within the lines of a page."""
+    return [
+        child.content
+        for token in tokens(page)
+        for child in token.children or []
+        if child.type == "code_inline"
+    ]
