@@ -16,7 +16,7 @@ from fras_monitor.access import Policy, query_of, require_closed
 from fras_monitor.commands import AnyCommand, Colouring, Look, Stop
 from fras_monitor.desk import Desk
 from fras_monitor.listening import Listener
-from fras_monitor.pace import Due
+from fras_monitor.pace import Due, give_way
 from fras_monitor.page.door import Door
 from fras_monitor.page.hub import Hub
 from fras_monitor.page.scene import Scene
@@ -82,6 +82,8 @@ class MonitorService:
         )
         self.address = door.address
         announce(self.address)
+        # The host's own thread draws; the server's, on which a stop comes, is there already.
+        give_way()
 
     def _on_command(self, command: AnyCommand) -> None:
         """Do what a button asks; the stop at once, on the thread that got it."""
