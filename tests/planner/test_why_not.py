@@ -257,10 +257,10 @@ WORDS = 'text(keep_off_edge,"Tissue at the edge is not grasped.").'
             "#program base. :- target(_,b(2,2)).",
             "",
             (
-                "b(2,2) is better than b(2,1) under the criterion 'weighted'; what keeps it from "
+                "b(2,2) is better than b(1,2) under the criterion 'weighted'; what keeps it from "
                 "being grasped is a rule without a name, or takes too long.",
                 "b(2,2): 57 mm from the nearest attachment, 30 mm from the region of interest; "
-                "b(2,1): 40 and 50 mm.",
+                "b(1,2): 40 and 10 mm.",
             ),
         ),
     ],
