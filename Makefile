@@ -1,5 +1,5 @@
 # The two commands of the README are `make run` and `make test`; both install what is missing.
-.PHONY: help install run test test-full check format bench browser screenshots clean
+.PHONY: help install run test test-full check format bench reference docs browser screenshots clean
 
 PYTHON ?= python3
 VENV := .venv
@@ -79,9 +79,15 @@ browser: ## install the browser that the tests of the surgeon's page drive (Debi
 	  echo "installing $(BROWSER)" && apt-get update -qq && DEBIAN_FRONTEND=noninteractive \
 	  apt-get install -qq --no-install-recommends $(BROWSER) fonts-dejavu-core >/dev/null; }
 
+reference: $(VENV)/.installed-dev ## make the pages of docs/ anew that are made from the code
+	$(BIN)/python -m manual
+
+docs: $(VENV)/.installed-dev ## build the documentation as a site in build/site/
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
+
 screenshots: $(VENV)/.installed-dev browser ## take the pictures of docs/tour.md anew
 	$(BIN)/python -m benchmarks.page_pictures
 
 clean: ## remove what was built; runs/ stays
 	rm -rf $(VENV) build dist .pytest_cache .ruff_cache .import_linter_cache .hypothesis
-	find services tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +
+	find services tests benchmarks manual -name __pycache__ -type d -prune -exec rm -rf {} +

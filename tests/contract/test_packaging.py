@@ -47,7 +47,7 @@ def test_wheels_hold_every_service(project: dict[str, Any]):
 
 def test_every_service_but_common_has_an_extra(project: dict[str, Any]):
     extras = set(project["project"]["optional-dependencies"])
-    beside_services = {"all", "bench", "dev", "export", "mkl", "rerun"}
+    beside_services = {"all", "bench", "dev", "docs", "export", "mkl", "rerun"}
     assert extras - beside_services == set(FOLDERS) - {"common"}
 
 

@@ -220,12 +220,25 @@ QUESTIONS: tuple[tuple[PlanningScene, str, str, int, tuple[tuple[str, str], ...]
 )
 
 
+# Rules of one's own that keep the best block from being grasped: with words, without, without a
+# name.
+OWN_RULES = (
+    "\n#program base. forbidden(reach(A,B),open_gripper_first) :- reachable(A,B), B = b(3,3).",
+    "\n#program base. rule(mine). forbidden(reach(A,B),mine) :- reachable(A,B), B = b(3,3).",
+    "\n#program base. :- target(_,b(3,3)).",
+)
+
+
 def answers(knowledge: Knowledge) -> Iterator[object]:
     """Why not another block or action, for a few of them."""
     for tissue, criterion, goal, horizon, asked in QUESTIONS:
         planner = Planner(knowledge, tissue, criterion, goal, horizon)
         for question, state in asked:
             yield outcome(planner.why_not, question, state.split())
+    for rule in OWN_RULES:
+        files = dict(knowledge.files)
+        files["constraints.lp"] += rule
+        yield outcome(Planner(Knowledge(files, ""), TISSUE).why_not, "b(3,3)", [])
     spent = Planner(knowledge, TISSUE, conflict_budget=0)
     yield outcome(spent.why_not, "reach(psm2,b(3,3))", [])
 

@@ -230,6 +230,58 @@ def test_a_question_about_what_there_is_not(
     assert says in str(caught.value)
 
 
+NAMED = "#program base. rule(keep_off_edge). forbidden(reach(A,B),keep_off_edge) :- "
+WORDS = 'text(keep_off_edge,"Tissue at the edge is not grasped.").'
+
+
+@pytest.mark.parametrize(
+    ("rule", "words", "sentences"),
+    [
+        (
+            NAMED + "reachable(A,B), B = b(2,2).",
+            WORDS,
+            ("b(2,2) may not be grasped. Tissue at the edge is not grasped.",),
+        ),
+        (
+            NAMED + "reachable(A,B), B = b(2,2).",
+            "",
+            ("b(2,2) may not be grasped: rule keep_off_edge.",),
+        ),
+        # The other arm would be free to.
+        (
+            NAMED + "reachable(A,B), A = psm1, B = b(2,2).",
+            WORDS,
+            ("b(2,2) is what the plan grasps.",),
+        ),
+        (
+            "#program base. :- target(_,b(2,2)).",
+            "",
+            (
+                "b(2,2) is better than b(1,2) under the criterion 'weighted'; what keeps it from "
+                "being grasped is a rule without a name, or takes too long.",
+                "b(2,2): 57 mm from the nearest attachment, 30 mm from the region of interest; "
+                "b(1,2): 40 and 10 mm.",
+            ),
+        ),
+    ],
+)
+def test_a_rule_of_ones_own_is_the_answer(
+    knowledge: Knowledge,
+    scene: PlanningScene,
+    rule: str,
+    words: str,
+    sentences: tuple[str, ...],
+) -> None:
+    added = {"constraints.lp": rule, "words.lp": words}
+    files = {name: f"{text}\n{added.get(name, '')}" for name, text in knowledge.files.items()}
+    either = PlanningScene.make(
+        scene.names, scene.blocks_m, scene.roi_m, {*scene.statics, "reachable(psm1,b(2,2))"}
+    )
+    planner = Planner(Knowledge(files, ""), either)
+    assert planner.why_not("b(2,2)", []).sentences == sentences
+    assert planner.why_not("b(1,1)", []).sentences == ATTACHED
+
+
 def test_asking_changes_no_plan(knowledge: Knowledge, make_scene: SceneMaker) -> None:
     """And each block asked about has an answer that is true by the planner's own measure."""
     rng = np.random.default_rng(5)

@@ -1,47 +1,69 @@
 """Each service by itself: its own main, with its own arguments."""
 
+import importlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
 import typer
 
 from fras_cli.commands.shared import SERVICE_ARGUMENTS
+from fras_common.extras import require_extra
 
 services_app = typer.Typer()
 
 
-# Extra and module of what is not `fras_<name>`.
-_MODULES = {
-    "router": ("router", "fras_common.router"),
-    "arms": ("motion", "fras_motion.arms_main"),
-    "patient": ("sim", "fras_sim.patient_main"),
+@dataclass(frozen=True)
+class ServiceCommand:
+    """A service's command: what it says, and where its main function is."""
+
+    about: str
+    module: str
+    extra: str
+
+    def main(self) -> Callable[[list[str] | None], int]:
+        """Load the service's main function.
+
+        Raises
+        ------
+        MissingExtra
+            If a library that the service needs is not installed.
+        """
+        with require_extra(self.extra):
+            return importlib.import_module(self.module).main
+
+
+SERVICES: Final = {
+    "router": ServiceCommand("Run a Zenoh router.", "fras_common.router", "router"),
+    "sim": ServiceCommand("Run the tissue simulator.", "fras_sim.__main__", "sim"),
+    "patient": ServiceCommand(
+        "Run the tissue simulator as the patient, beside the model of it.",
+        "fras_sim.patient_main",
+        "sim",
+    ),
+    "sa": ServiceCommand("Run situation awareness.", "fras_sa.__main__", "sa"),
+    "planner": ServiceCommand(
+        "Run the planner and its executive.", "fras_planner.__main__", "planner"
+    ),
+    "motion": ServiceCommand("Run motion.", "fras_motion.__main__", "motion"),
+    "arms": ServiceCommand(
+        "Play two arms under CRTK's keys, for `fras motion --driver crtk`.",
+        "fras_motion.arms_main",
+        "motion",
+    ),
+    "recorder": ServiceCommand("Run the recorder.", "fras_recorder.__main__", "recorder"),
 }
 
 
-def _service(name: str, help_text: str) -> None:
-    """Register `fras <name>`: the service's own main, with its own arguments."""
-
+def _register(name: str, service: ServiceCommand) -> None:
     @services_app.command(
-        name, help=help_text, context_settings=SERVICE_ARGUMENTS, add_help_option=False
+        name, help=service.about, context_settings=SERVICE_ARGUMENTS, add_help_option=False
     )
     def command(context: typer.Context) -> None:
-        import importlib
-
-        from fras_common.extras import require_extra
-
-        extra, module = _MODULES.get(name, (name, f"fras_{name}.__main__"))
-        with require_extra(extra):
-            main = importlib.import_module(module).main
-        raise typer.Exit(main(context.args))
+        raise typer.Exit(service.main()(context.args))
 
     _ = command
 
 
-for _name, _help in {
-    "router": "Run a Zenoh router.",
-    "sim": "Run the tissue simulator.",
-    "patient": "Run the tissue simulator as the patient, beside the model of it.",
-    "sa": "Run situation awareness.",
-    "planner": "Run the planner and its executive.",
-    "motion": "Run motion.",
-    "arms": "Play two arms under CRTK's keys, for `fras motion --driver crtk`.",
-    "recorder": "Run the recorder.",
-}.items():
-    _service(_name, _help)
+for _name, _service in SERVICES.items():
+    _register(_name, _service)

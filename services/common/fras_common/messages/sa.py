@@ -14,7 +14,7 @@ class Verdict(Header, frozen=True, kw_only=True):
     Attributes
     ----------
     level : {"ok", "soft", "hard", "invalid"}
-        What motion may do next, section "tick protocol" of the architecture.
+        What motion may do next, docs/tick-protocol.md.
     max_force_n : float
         Force by the scenario's metric.
     visibility : float

@@ -255,11 +255,28 @@ class Planner:
             f"count(actions,{self._horizon})",
         ]
         if action is None:
+            facts += self._keeping(asked)
             told = tell_why_not_block(self._knowledge, self._preference, facts)
             return WhyNot(asked, (), told)
         rules, contrast = self._contrast(action, plan)
         facts += [*contrast, *(f"core({rule})" for rule in rules)]
         return WhyNot(asked, tuple(rules), tell_why_not_action(self._knowledge, facts))
+
+    def _keeping(self, block: str) -> list[str]:
+        """Return `keeps(Rule,Arm)` for each rule that alone keeps an arm from grasping a block."""
+        targets = self._control.symbolic_atoms.by_signature("target", 2)
+        aims = [atom for atom in targets if str(atom.symbol.arguments[1]) == block]
+        try:
+            with self._any_model():
+                return [
+                    f"keeps({rule},{aim.symbol.arguments[0]})"
+                    for aim in aims
+                    if not self._search([aim.literal])[0].unsatisfiable
+                    for rule, enforced in self._rules.items()
+                    if self._search([aim.literal, enforced])[0].unsatisfiable
+                ]
+        except OutOfTime:
+            return []
 
     def _contrast(self, action: clingo.Symbol, plan: Plan) -> tuple[list[str], list[str]]:
         """Make the best plan that begins with an action.

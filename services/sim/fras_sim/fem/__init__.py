@@ -1,8 +1,6 @@
 """Nonlinear soft tissue by finite elements: a library of its own.
 
-mesh = box_mesh()
-tissue = TissueSimulator(mesh, TissueParameters(), fixed_nodes)
-result = tissue.step({"psm1": ToolInput(tip_m, jaw_rad)})
+`TissueSimulator` is the way in; an example stands in docs/reference/python/fem.md.
 """
 
 from fras_sim.fem.cells import Cell
