@@ -2,7 +2,8 @@
 
 mesh = box_mesh()
 tissue = TissueSimulator(mesh, TissueParameters(), fixed_nodes)
-result = tissue.step({"psm1": ToolInput(tip_m, jaw_rad)})
+tissue.measure({"psm1": ToolInput(tip_m, jaw_rad=1.0)})           # open, at tick 0
+result = tissue.step({"psm1": ToolInput(tip_m, jaw_rad=0.0)})     # closes, and grasps
 """
 
 from fras_sim.fem.cells import Cell
