@@ -2,8 +2,8 @@
 
 A sheet of tissue, fixed along one side, is grasped at the other and lifted, so slowly that it is in
 equilibrium at each height. One sees a table: how high, which force the tool bears, and the largest
-force on any node. The force grows faster than the height, as the model is nonlinear. The last column
-is of a tissue of twice the stiffness: at each height twice the force.
+force on any node. The force grows faster than the height, as the model is nonlinear. The last
+column is of a tissue of twice the stiffness: at each height twice the force.
 """
 
 # %% A mesh, a material, and what holds the body: all in SI units, all plain arrays.

@@ -1,8 +1,8 @@
 """Plan from a context written by hand: `python examples/plan_by_hand.py`.
 
 No service and no tissue: a grid of 3 x 3 blocks, two of them attached, the target region under a
-third. One sees the plan, why it is this one, what is expected after each action, and why it does not
-grasp an attached block. The reasons come from the rules in `asp/`, not from this file.
+third. One sees the plan, why it is this one, what is expected after each action, and why it does
+not grasp an attached block. The reasons come from the rules in `asp/`, not from this file.
 """
 
 # %% What is true: atoms as `asp/domain.lp` declares them.

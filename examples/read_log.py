@@ -2,8 +2,8 @@
 
     python examples/read_log.py runs/<run>/audit.mcap
 
-Nothing of FRAS is needed: `pip install mcap zstandard msgpack`. One sees which trial it was, what was
-planned and why, how many messages each process wrote, and the largest force of each action.
+Nothing of FRAS is needed: `pip install mcap zstandard msgpack`. One sees which trial it was, what
+was planned and why, how many messages each process wrote, and the largest force of each action.
 """
 
 # %% The file tells its own types: a JSON Schema for each key.
