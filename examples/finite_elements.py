@@ -36,6 +36,7 @@ def lift(young_modulus_pa: float, heights_m: list[float]) -> list[tuple[float, f
 # %% Forces over the height, for two tissues.
 heights_m = [0.002 * step for step in range(16)]
 soft, stiff = lift(3000.0, heights_m), lift(6000.0, heights_m)
-print("height    tool    node    tool, twice as stiff")
+print("height   tool    node    tool, twice as stiff")
 for height_m, (tool_n, node_n), (stiff_n, _) in zip(heights_m, soft, stiff, strict=True):
-    print(f"{1000 * height_m:3.0f} mm {tool_n:7.4f} {node_n:7.4f} {stiff_n:9.4f} N")
+    forces_mn = (1000 * force_n for force_n in (tool_n, node_n, stiff_n))
+    print(f"{1000 * height_m:3.0f} mm", *(f"{force_mn:7.3f}" for force_mn in forces_mn), "mN")

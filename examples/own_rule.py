@@ -1,7 +1,7 @@
 """A rule of one's own beside those of situation awareness: `python examples/own_rule.py`.
 
 Situation awareness judges the force. This rule looks at the shape: a block is `overstretched` while
-an edge of the surface in it is half as long again as it is at rest. A tissue is grasped and lifted
+an edge of the surface in it is a quarter longer than at rest. A tissue is grasped and lifted
 here without any service. One sees at which tick the rule begins to hold, where, by which numbers,
 and what the verdict on the force is then; at the end all fluents, the rule's among them. A planner
 that is to use them needs rules that declare them, as `asp/domain.lp` does.
@@ -37,7 +37,7 @@ model = TissueModel(
 awareness = Awareness(AwarenessParameters(), model)
 
 # %% The rule: a pure function of what is seen, that gives fluents with the numbers behind them.
-STRETCH_LIMIT = 1.5
+STRETCH_LIMIT = 1.25
 edges = np.unique(np.sort(mesh.surface[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)), axis=0)
 ends_m = mesh.nodes_m[edges]
 rest_m = np.linalg.norm(ends_m[:, 1] - ends_m[:, 0], axis=1)
@@ -57,7 +57,7 @@ def overstretched(seen: TissueView) -> dict[str, Evidence]:
 
 
 # %% Grasp beside the far edge, then lift at 20 mm/s, and judge each tick.
-grasp_m = np.array([0.09, 0.05, 0.005])
+grasp_m = awareness.blocks.rest_m[awareness.blocks.names.index("b(7,3)")]
 resting = ArmView(np.array([0.05, 0.10, 0.1]), jaw_rad=1.0)
 tissue.measure({"psm1": ToolInput(grasp_m, jaw_rad=1.0)})  # open: it grasps as it closes
 memory, before = Memory(), set[str]()

@@ -63,13 +63,14 @@ def test_a_client_that_watches_the_force_is_twenty_lines() -> None:
 def test_the_force_grows_faster_than_the_height_and_with_the_stiffness(tmp_path: Path) -> None:
     lines = run("finite_elements.py", tmp_path).splitlines()[1:]
     rows = [[float(number) for number in re.findall(r"\d+(?:\.\d+)?", line)] for line in lines]
-    heights_mm, tool_n, node_n, stiff_n = zip(*rows, strict=True)
+    heights_mm, tool_mn, node_mn, stiff_mn = zip(*rows, strict=True)
     assert heights_mm == tuple(range(0, 32, 2))
-    assert list(tool_n) == sorted(tool_n)
-    assert tool_n[-1] > 2.5 * tool_n[7] > 0
-    assert all(one > 0 for one in node_n[1:])
-    for soft, stiff in zip(tool_n, stiff_n, strict=True):
-        assert stiff == pytest.approx(2 * soft, abs=2e-4)  # printed to 1e-4 N
+    assert list(tool_mn) == sorted(tool_mn)
+    assert tool_mn[-1] > 4 * tool_mn[7] > 0
+    assert all(one > 0 for one in node_mn[1:])
+    for soft, stiff in zip(tool_mn, stiff_mn, strict=True):
+        # An equilibrium is found to a tolerance, and printed to a thousandth.
+        assert stiff == pytest.approx(2 * soft, rel=0.01, abs=2e-3)
 
 
 def test_a_rule_of_ones_own_holds_from_some_tick_on_with_its_numbers(tmp_path: Path) -> None:
@@ -83,7 +84,7 @@ def test_a_rule_of_ones_own_holds_from_some_tick_on_with_its_numbers(tmp_path: P
         )
         assert found, line
         assert int(found[1]) > 0
-        assert float(found[2]) >= 1.5
+        assert float(found[2]) >= 1.25
     assert "closed_gripper(psm1)" in last
     assert "in_hand(psm1," in last
     assert "overstretched(" in last
