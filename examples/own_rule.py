@@ -56,12 +56,14 @@ def overstretched(seen: TissueView) -> dict[str, Evidence]:
     return fluents
 
 
-# %% Grasp beside the far edge, then lift at 20 mm/s, and judge each tick.
+# %% Grasp a block beside the far edge, and lift it at 20 mm/s.
 grasp_m = awareness.blocks.rest_m[awareness.blocks.names.index("b(7,3)")]
 resting = ArmView(np.array([0.05, 0.10, 0.1]), jaw_rad=1.0)
 tissue.measure({"psm1": ToolInput(grasp_m, jaw_rad=1.0)})  # open: it grasps as it closes
-memory, before = Memory(), set[str]()
-for tick in range(90):
+
+
+def lift(tick: int) -> tuple[TissueView, RobotView]:
+    """Do one tick; return what situation awareness sees then."""
     tip_m = grasp_m + np.array([0.0, 0.0, 0.02 * parameters.dt_s * tick])
     state = tissue.step({"psm1": ToolInput(tip_m, jaw_rad=0.0)})
     view = TissueView(
@@ -72,16 +74,22 @@ for tick in range(90):
         converged=state.solver.converged,
         max_node_speed_m_s=state.max_node_speed_m_s,
     )
-    robot = RobotView(tick, {"psm1": ArmView(tip_m, jaw_rad=0.0), "psm2": resting})
+    return view, RobotView(tick, {"psm1": ArmView(tip_m, jaw_rad=0.0), "psm2": resting})
+
+
+# %% Judge each tick, by the force and by the rule.
+view, robot = lift(0)
+memory, own = awareness.judge(view, robot, Memory()).memory, overstretched(view)
+for tick in range(1, 90):
+    before = own
+    view, robot = lift(tick)
     verdict = awareness.judge(view, robot, memory)
-    memory = verdict.memory
-    own = overstretched(view)
+    memory, own = verdict.memory, overstretched(view)
     for name in sorted(own.keys() - before):
         print(
             f"tick {tick}: {name}, {own[name]['stretch_ratio']:.2f} of its length at rest; "
             f"force {verdict.force_n:.2f} N, verdict {verdict.level}"
         )
-    before = set(own)
 
 # %% Both together, as a planner is told them.
 context = awareness.context(view, robot, memory)
