@@ -43,7 +43,7 @@ test: $(VENV)/.installed-dev ## run all tests, those with real processes too
 	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile
 
 test-full: $(VENV)/.installed-dev ## the same with every random campaign in full length
-	FRAS_TESTS=full $(BIN)/python -m pytest --numprocesses 2 --dist loadfile
+	FRAS_TESTS=full $(BIN)/python -m pytest --numprocesses 2 --dist loadfile --fail-on-flaky
 
 check: $(VENV)/.installed-dev ## lint, format, types, import contracts
 	$(BIN)/ruff check .

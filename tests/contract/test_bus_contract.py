@@ -167,6 +167,42 @@ def test_a_subscriber_that_was_first_hears_a_latched_topic_once(open_bus: Open, 
     assert [m.messages for m in heard.count(2)] == [0, 1]
 
 
+def test_who_looks_now_and_then_sees_the_latest_once(open_bus: Open, listen: Listen):
+    seen, numbers = listen(), itertools.count()
+    latest = open_bus("monitor/1").latest(RECORDER_STATUS)
+    assert latest.take() is None
+    publisher = open_bus("recorder/1").publisher(RECORDER_STATUS)
+
+    def look() -> None:
+        if (found := latest.take()) is not None:
+            seen(found)
+
+    def put_and_look() -> None:
+        publisher.put(status(next(numbers)))
+        look()
+
+    put_until(put_and_look, seen)
+    for number in (1001, 1002, 1003):
+        publisher.put(status(number))
+    put_until(look, seen, lambda got: got[-1].messages == 1003)
+    told = [one.messages for one in seen]
+    assert told == sorted(set(told))
+    assert latest.take() is None
+
+
+def test_a_latest_that_does_not_fit_is_reported_and_is_none(open_bus: Open, listen: Listen):
+    refused = listen()
+    latest = open_bus("monitor/1", on_malformed=refused).latest(RECORDER_STATUS)
+    publisher = open_bus("recorder/1").publisher_raw(RECORDER_STATUS.key, RECORDER_STATUS.qos)
+
+    def put_and_look() -> None:
+        publisher.put(b"no message", "text/plain")
+        assert latest.take() is None
+
+    put_until(put_and_look, refused)
+    assert isinstance(refused[0], MalformedMessage)
+
+
 def test_a_telemetry_topic_reaches_its_subscribers(open_bus: Open, listen: Listen):
     heard = [listen(), listen()]
     for number, collect in enumerate(heard):
@@ -292,6 +328,7 @@ def test_every_call_on_a_closed_bus_raises(open_bus: Open):
         lambda: raw.put(b"", "text/plain"),
         lambda: bus.tokens(1.0),
         lambda: bus.subscribe(SIM_LOG, print),
+        lambda: bus.latest(RECORDER_STATUS),
         lambda: bus.subscribe_raw("**", print),
         lambda: bus.serve(SA_TARGET, print),
         lambda: bus.ask(SA_TARGET, request, print, 1.0),

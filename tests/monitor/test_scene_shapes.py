@@ -5,13 +5,18 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from fras_common.messages import Vec3
 from fras_common.messages.base import Array
 from fras_log.export.instruments import instrument
 from fras_monitor.outline import outline
-from fras_monitor.shapes import Mesh, ball, cone, dashes, instrument_mesh, ring
+from fras_monitor.shapes import Mesh, ball, cones, dashes, instrument_mesh, ring
 from fras_monitor.stage import LIFT_M, Followers, OnFaces, blocks_of, ground_of, kinds_of, path_of
 from fras_monitor.surface import BANDS, band_colours, bands, share_of
 from support import pictures as p
+
+
+def cone(begin_m: Vec3, end_m: Vec3, begin_radius_m: float, end_radius_m: float) -> Mesh:
+    return cones(np.array([[begin_m, end_m]], float), np.array([[begin_radius_m, end_radius_m]]))
 
 
 def volume(mesh: Mesh) -> float:
@@ -49,6 +54,16 @@ def test_a_ball_is_a_ball():
 
 def test_a_cone_without_length_is_still_finite():
     assert np.isfinite(cone((1, 1, 1), (1, 1, 1), 0.1, 0.1).vertices_m).all()
+
+
+def test_several_cones_are_those_cones_one_behind_the_other():
+    ends_m = np.array([[(0, 0, 0), (0, 0, 1)], [(1, 2, 3), (0, -1, 2)]], float)
+    radii_m = np.array([[0.5, 0.2], [0.1, 0.3]])
+    both = cones(ends_m, radii_m)
+    alone = [cones(ends_m[[row]], radii_m[[row]]) for row in range(2)]
+    assert_allclose(both.vertices_m, np.concatenate([one.vertices_m for one in alone]))
+    assert edges_that_are_not_shared_by_two(both) == 0
+    assert volume(both) == pytest.approx(sum(volume(one) for one in alone))
 
 
 def test_jaws_open_about_the_tip_and_nothing_else_changes():

@@ -2,13 +2,14 @@
 
 from itertools import count
 
+import msgspec
 import pytest
 
 from fras_common.messages import Context
 from fras_common.scenario import PlannerSection, Scenario
 from fras_planner.adapter import PlanMaker
 from fras_planner.memory import PlanRequest
-from fras_planner.planning import Knowledge
+from fras_planner.planning import Knowledge, UnknownCriterion
 
 CONTEXT = Context(
     trial="t",
@@ -33,3 +34,20 @@ def test_a_plan_is_given_up_after_the_time_of_the_scenario(
     plan = PlanMaker(knowledge, scenario, count(step=2.0).__next__)(CONTEXT, REQUEST)
     assert (plan.no_plan.core if plan.no_plan else None) == core
     assert bool(plan.actions) == (core is None)
+
+
+def test_a_second_scene_of_a_trial_is_planned_anew(knowledge: Knowledge) -> None:
+    """The rules that were parsed ahead are the first scene's."""
+    maker = PlanMaker(knowledge, Scenario(), lambda: 0.0)
+    first = maker(CONTEXT, REQUEST)
+    fluents = [*CONTEXT.fluents[:2], "above_roi(b(1,1))"]
+    moved = msgspec.structs.replace(CONTEXT, roi_m=(0.02, 0.02, 0.0), fluents=fluents)
+    second = maker(moved, REQUEST)
+    assert (first.target, second.target) == ("b(1,2)", "b(1,1)")
+    assert maker(CONTEXT, REQUEST).explanation
+
+
+def test_what_is_wrong_with_the_rules_is_told_by_the_first_plan(knowledge: Knowledge) -> None:
+    maker = PlanMaker(knowledge, Scenario(planner=PlannerSection(criterion="best")), lambda: 0.0)
+    with pytest.raises(UnknownCriterion, match="best"):
+        maker(CONTEXT, REQUEST)

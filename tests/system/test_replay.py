@@ -213,6 +213,7 @@ def test_a_live_cell_and_a_second_replay_are_refused(
     second = fras("replay", str(recorded_trial), "--cell", cell, "--connect", connect)
     assert second.end() == 3
     assert "replay/" in second.text
+    assert first.process.poll() is None, first.text
     assert client.status().messages == 0
     assert client.tell("stop").phase == "paused"
     assert first.end() == 0

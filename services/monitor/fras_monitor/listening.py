@@ -31,7 +31,7 @@ from fras_monitor.picture import Picture, apply, remembered, with_token
 ANSWER_S: Final = 2.0
 
 # Of these only the latest counts; of the others each does.
-LATEST: Final[tuple[Topic[Any], ...]] = (TISSUE_MODEL, TISSUE_STATE, CONTEXT, RECORDER_STATUS)
+LATEST: Final[tuple[Topic[Any], ...]] = (TISSUE_MODEL, CONTEXT, RECORDER_STATUS)
 EACH: Final[tuple[Topic[Any], ...]] = (
     VERDICT, PLAN, TASK_STATUS, ACTION_RESULT, HOLDS, SUPERVISOR_STATUS,
 )  # fmt: skip
@@ -71,6 +71,8 @@ class Listener:
             bus.subscribe(topic, self._keep_latest(topic.key))
         for topic in EACH:
             bus.subscribe(topic, self.note)
+        # Large, and many more than are drawn: looked at as often as anything is drawn.
+        self._tissue = bus.latest(TISSUE_STATE)
         bus.subscribe(HEALTH, self._on_health)
         bus.subscribe(ROBOT_STATE, self._on_robot_state)
         bus.watch_tokens(lambda name, present: self.note(_Token(name, present)))
@@ -84,6 +86,8 @@ class Listener:
 
     def look(self) -> Picture:
         """Take in what has arrived, and return all that is known."""
+        if (tissue := self._tissue.take()) is not None:
+            self._mail.replace(TISSUE_STATE.key, tissue, time.monotonic())
         for message, at_s in self._mail.take():
             self.picture = _with(self.picture, message, at_s)
         self._host.counts["received"] = self._mail.received

@@ -16,7 +16,7 @@ from fras_monitor.access import Policy, query_of, require_closed
 from fras_monitor.commands import AnyCommand, Colouring, Look, Stop
 from fras_monitor.desk import Desk
 from fras_monitor.listening import Listener
-from fras_monitor.pace import Due
+from fras_monitor.pace import Due, give_way
 from fras_monitor.page.door import Door
 from fras_monitor.page.hub import Hub
 from fras_monitor.page.scene import Scene
@@ -25,6 +25,7 @@ from fras_monitor.stop import Stopper
 from fras_monitor.view import course_of, holds_of, view_of
 
 FRAME_S: Final = 0.05
+VIEW_S: Final = 0.1
 COURSE_S: Final = 0.25
 PRESENCE_S: Final = 0.25
 REPLAY_S: Final = 0.1
@@ -59,7 +60,7 @@ class MonitorService:
     ) -> None:
         require_closed(bind, policy)
         self._host = host
-        self._frame, self._course = Due(FRAME_S), Due(COURSE_S)
+        self._frame, self._view, self._course = Due(FRAME_S), Due(VIEW_S), Due(COURSE_S)
         self._presence_due, self._replay = Due(PRESENCE_S), Due(REPLAY_S)
         self._looking = (0, 0)
         # No supervisor keeps the page, and so none says which process it is.
@@ -82,6 +83,8 @@ class MonitorService:
         )
         self.address = door.address
         announce(self.address)
+        # The host's own thread draws; the server's, on which a stop comes, is there already.
+        give_way()
 
     def _on_command(self, command: AnyCommand) -> None:
         """Do what a button asks; the stop at once, on the thread that got it."""
@@ -108,7 +111,8 @@ class MonitorService:
         if picture.holds is not None:
             self.stopper.see_holds(picture.holds.message.holds, picture.holds.at_s)
         self._say_who_looks(now_s)
-        self._show(picture, now_s)
+        if self._view.take(now_s):
+            self._show(picture, now_s)
         self._scene.draw(picture)
         return self._frame.wait_s(time.monotonic())
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Final
 
 import numpy as np
@@ -19,6 +20,18 @@ BLADE_END_M: Final = 0.0004
 # What is drawn of the shaft: the whole of it hides the tissue from most sides.
 SHAFT_LENGTH_M: Final = 0.12
 DASH_M: Final = 0.003
+INSTRUMENT_RADII_M: Final = np.array(
+    [
+        (SHAFT_RADIUS_M, SHAFT_RADIUS_M),
+        (HINGE_RADIUS_M, BLADE_RADIUS_M),
+        (BLADE_RADIUS_M, BLADE_END_M),
+        (BLADE_RADIUS_M, BLADE_END_M),
+    ]
+)
+UP: Final = np.array([0.0, 0.0, 1.0])
+TURNS: Final = ([1, 2, 0], [2, 0, 1])
+ANGLES_RAD: Final = 2.0 * np.pi * np.arange(SIDES) / SIDES
+CIRCLE: Final = (np.cos(ANGLES_RAD)[:, None], np.sin(ANGLES_RAD)[:, None])
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,35 +48,32 @@ class Mesh:
     faces: NDArray[np.uint32]
 
 
-def joined(meshes: Sequence[Mesh]) -> Mesh:
-    """Make one mesh of several."""
-    starts = np.cumsum([0, *(len(one.vertices_m) for one in meshes[:-1])])
-    faces = [one.faces + start for one, start in zip(meshes, starts.tolist(), strict=True)]
-    return Mesh(
-        np.concatenate([one.vertices_m for one in meshes]),
-        np.concatenate(faces).astype(np.uint32),
-    )
+def cones(ends_m: FloatArray, radii_m: FloatArray) -> Mesh:
+    """Return closed frusta as one mesh; as many vertices wherever they lie.
+
+    Parameters
+    ----------
+    ends_m : ndarray, shape (n, 2, 3) [m]
+    radii_m : ndarray, shape (n, 2) [m]
+    """
+    along = ends_m[:, 1] - ends_m[:, 0]
+    length = np.sqrt((along * along).sum(axis=1))
+    axis = np.where(length[:, None] > 0.0, along / np.maximum(length, 1e-30)[:, None], UP)
+    side = _cross(axis, np.eye(3)[np.abs(axis).argmin(axis=1)])
+    side /= np.sqrt((side * side).sum(axis=1))[:, None]
+    circle = CIRCLE[0] * side[:, None, :] + CIRCLE[1] * _cross(axis, side)[:, None, :]
+    rims = ends_m[:, :, None, :] + radii_m[:, :, None, None] * circle[:, None, :, :]
+    vertices = np.concatenate([rims.reshape(len(ends_m), -1, 3), ends_m], axis=1)
+    return Mesh(vertices.reshape(-1, 3).astype(np.float32), _cone_faces(len(ends_m)))
 
 
-def cone(
-    begin_m: Sequence[float],
-    end_m: Sequence[float],
-    begin_radius_m: float,
-    end_radius_m: float,
-) -> Mesh:
-    """Return a closed frustum between two points; as many vertices wherever they lie."""
-    begin, end = np.asarray(begin_m, dtype=np.float64), np.asarray(end_m, dtype=np.float64)
-    along = end - begin
-    length = float(np.linalg.norm(along))
-    axis = along / length if length > 0.0 else np.array([0.0, 0.0, 1.0])
-    side = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
-    side /= np.linalg.norm(side)
-    other = np.cross(axis, side)
-    angles = 2.0 * np.pi * np.arange(SIDES) / SIDES
-    circle = np.outer(np.cos(angles), side) + np.outer(np.sin(angles), other)
-    vertices = np.concatenate(
-        [begin + begin_radius_m * circle, end + end_radius_m * circle, [begin], [end]]
-    )
+def _cross(one: FloatArray, two: FloatArray) -> FloatArray:
+    """As `numpy.cross` for rows, without its many looks at shapes."""
+    return one[:, TURNS[0]] * two[:, TURNS[1]] - one[:, TURNS[1]] * two[:, TURNS[0]]
+
+
+@cache
+def _cone_faces(count: int) -> NDArray[np.uint32]:
     here = np.arange(SIDES)
     there = (here + 1) % SIDES
     first, last = np.full(SIDES, 2 * SIDES), np.full(SIDES, 2 * SIDES + 1)
@@ -75,7 +85,8 @@ def cone(
             np.stack([last, here + SIDES, there + SIDES], axis=-1),
         ]
     )
-    return Mesh(vertices.astype(np.float32), faces.astype(np.uint32))
+    starts = (2 * SIDES + 2) * np.arange(count)
+    return (faces + starts[:, None, None]).reshape(-1, 3).astype(np.uint32)
 
 
 def instrument_mesh(drawn: Instrument) -> Mesh:
@@ -83,14 +94,12 @@ def instrument_mesh(drawn: Instrument) -> Mesh:
     wrist, centre = np.array(drawn.wrist_m), np.array(drawn.remote_centre_m)
     away = centre - wrist
     far = wrist + away * min(1.0, SHAFT_LENGTH_M / max(float(np.linalg.norm(away)), 1e-9))
-    blades = [cone(drawn.hinge_m, end, BLADE_RADIUS_M, BLADE_END_M) for end in drawn.blades_m]
-    return joined(
-        [
-            cone(far.tolist(), drawn.wrist_m, SHAFT_RADIUS_M, SHAFT_RADIUS_M),
-            cone(drawn.wrist_m, drawn.hinge_m, HINGE_RADIUS_M, BLADE_RADIUS_M),
-            *blades,
-        ]
-    )
+    ends = [
+        (far, drawn.wrist_m),
+        (drawn.wrist_m, drawn.hinge_m),
+        *((drawn.hinge_m, end) for end in drawn.blades_m),
+    ]
+    return cones(np.array(ends), INSTRUMENT_RADII_M)
 
 
 def ring(centre_m: Sequence[float], radius_m: float, tube_m: float, count: int = 48) -> Mesh:

@@ -7,12 +7,11 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from fras_common.messages import Context, RobotState, TissueModel, TissueState
+from fras_common.messages import Context, TissueModel, TissueState
 from fras_common.scenario import AwarenessSection, MotionSection
-from fras_log.export.instruments import instrument
 from fras_monitor.outline import outline
 from fras_monitor.picture import Picture
-from fras_monitor.shapes import FloatArray, Mesh, dashes, instrument_mesh
+from fras_monitor.shapes import FloatArray, dashes
 
 BlockKind = Literal["free", "fixed", "chosen", "held", "out_of_reach"]
 
@@ -79,22 +78,33 @@ class OnFaces:
         corners_m = nodes_m[surface]
         first, second = (corners_m[:, i, :2] - corners_m[:, 0, :2] for i in (1, 2))
         twice_area = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
-        up = twice_area > 0.0
-        if not up.any():
+        up = np.flatnonzero(twice_area > 0.0)
+        if not len(up):
             return cls(np.zeros((0, 3), dtype=np.int32), np.zeros((0, 3)))
-        away = points_m[:, None, :2] - corners_m[None, up, 0, :2]
-        one = (away[..., 0] * second[up, 1] - away[..., 1] * second[up, 0]) / twice_area[up]
-        two = (away[..., 1] * first[up, 0] - away[..., 0] * first[up, 1]) / twice_area[up]
-        weights = np.stack([1.0 - one - two, one, two], axis=-1)
-        least = weights.min(axis=-1)
-        heights_m: FloatArray = np.einsum("ijk,jk->ij", weights, corners_m[up, :, 2])
-        # Above all that is outside; the highest of those within.
-        rank = np.array(least, dtype=np.float64)
-        within = least >= _WITHIN
-        rank[within] = 1.0 + heights_m[within] - heights_m.min(initial=0.0)
-        chosen = np.argmax(rank, axis=1)
-        inside = np.clip(weights[np.arange(len(points_m)), chosen], 0.0, None)
-        return cls(surface[up][chosen], inside / inside.sum(axis=1, keepdims=True))
+
+        def weights_of(points: NDArray[np.intp], faces: NDArray[np.intp]) -> FloatArray:
+            away = points_m[points, :2] - corners_m[faces, 0, :2]
+            one = away[..., 0] * second[faces, 1] - away[..., 1] * second[faces, 0]
+            two = away[..., 1] * first[faces, 0] - away[..., 0] * first[faces, 1]
+            one, two = one / twice_area[faces], two / twice_area[faces]
+            return np.stack([1.0 - one - two, one, two], axis=-1)
+
+        chosen = np.full(len(points_m), -1, dtype=np.intp)
+        lower, upper = corners_m[up, :, :2].min(axis=1), corners_m[up, :, :2].max(axis=1)
+        here = points_m[:, None, :2]
+        points, faces = np.nonzero(((here >= lower) & (here <= upper)).all(axis=-1))
+        faces = up[faces]
+        weights = weights_of(points, faces)
+        heights_m = np.einsum("ij,ij->i", weights, corners_m[faces, :, 2])
+        # The last that is written for a point stays: the highest of those within.
+        within = weights.min(axis=-1) >= _WITHIN
+        order = np.flatnonzero(within)[np.argsort(heights_m[within], kind="stable")]
+        chosen[points[order]] = faces[order]
+        if len(beside := np.flatnonzero(chosen < 0)):
+            least = weights_of(beside[:, None], up[None, :]).min(axis=-1)
+            chosen[beside] = up[np.argmax(least, axis=1)]
+        inside = np.clip(weights_of(np.arange(len(points_m)), chosen), 0.0, None)
+        return cls(surface[chosen], inside / inside.sum(axis=1, keepdims=True))
 
     def places_m(self, nodes_m: FloatArray) -> FloatArray:
         """Where they are on the tissue as it is."""
@@ -205,11 +215,6 @@ def kinds_of(context: Context, target: str) -> tuple[BlockKind, ...]:
         else:
             kinds.append("free" if name in reachable else "out_of_reach")
     return tuple(kinds)
-
-
-def instruments_of(robot: RobotState) -> Mapping[str, Mesh]:
-    """Return the mesh of each arm's instrument."""
-    return {name: instrument_mesh(instrument(arm)) for name, arm in robot.arms.items()}
 
 
 def path_of(picture: Picture, block_m: Mapping[str, FloatArray]) -> FloatArray:

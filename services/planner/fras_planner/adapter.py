@@ -9,10 +9,12 @@ from fras_planner.memory import PlanRequest
 from fras_planner.planning import (
     Context,
     Knowledge,
+    Parsed,
     Plan,
     Planner,
     PlanningError,
     PlanningScene,
+    parse,
     verify,
 )
 
@@ -40,6 +42,7 @@ class PlanMaker:
         self._clock = clock
         self._knowledge = knowledge
         self._section = scenario.planner
+        self._parsed = self._parse_ahead()
         self._planner: Planner | None = None
         self._scene: PlanningScene | None = None
         self._latest: tuple[m.Context, PlanRequest] | None = None
@@ -116,6 +119,14 @@ class PlanMaker:
             sentences=list(answer.sentences),
         )
 
+    def _parse_ahead(self) -> Parsed | None:
+        """Parse the rules before the scene is known, so that the first plan waits for less."""
+        try:
+            return parse(self._knowledge, self._section.criterion, self._section.goal)
+        except PlanningError:
+            # The first plan says so, where it is waited for.
+            return None
+
     def _planner_for(self, context: m.Context) -> Planner:
         scene = PlanningScene.from_context(
             Context(
@@ -136,7 +147,9 @@ class PlanMaker:
                 goal=self._section.goal,
                 time_limit_s=self._section.time_limit_s,
                 clock=self._clock,
+                parsed=self._parsed,
             )
+            self._parsed = None
         return self._planner
 
 

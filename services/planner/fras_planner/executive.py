@@ -32,12 +32,7 @@ from fras_common.messages import (
     TaskStatus,
 )
 from fras_common.scenario import Scenario
-from fras_common.topics import (
-    EXECUTE,
-    RECORDER_OPEN,
-    SA_CONTEXT,
-    SA_TARGET,
-)
+from fras_common.topics import EXECUTE, RECORDER_OPEN, SA_CONTEXT, SA_TARGET
 from fras_planner.approval import Proposal, rejected, rejection
 from fras_planner.beginning import compare, log_request, reset_all
 from fras_planner.effects import Accept, Ask, AwaitDecision, AwaitResult, Effect, Say

@@ -20,6 +20,7 @@ from fras_common.messages import Fault, Header
 from fras_common.topics import Qos, Query, Topic
 
 M = TypeVar("M", bound=Header)
+M_co = TypeVar("M_co", bound=Header, covariant=True)
 Req = TypeVar("Req")
 Rep = TypeVar("Rep")
 Req_co = TypeVar("Req_co", covariant=True)
@@ -81,6 +82,14 @@ class RawPublisher(Protocol):
         ...
 
 
+class Latest(Protocol[M_co]):
+    """What was said last under a key; costs nothing until it is looked at."""
+
+    def take(self) -> M_co | None:
+        """Return the latest message since the last look; None if there is none."""
+        ...
+
+
 class Call(Protocol[Req_co, Rep_contra]):
     """A query that waits for its answer; exactly one of `reply` and `fail` must be called."""
 
@@ -114,6 +123,10 @@ class Bus(Protocol):
 
     def subscribe(self, topic: Topic[M], callback: Callable[[M], None]) -> None:
         """Receive every message of a key or family; latched topics deliver their last value."""
+        ...
+
+    def latest(self, topic: Topic[M]) -> Latest[M]:
+        """Look at a concrete key now and then; what is lost on the way is not asked for."""
         ...
 
     def subscribe_raw(self, key_expr: str, callback: Callable[[RawSample], None]) -> None:

@@ -7,8 +7,8 @@ from typing import Any, Generic, TypeVar
 
 import msgspec
 
-from fras_common.bus.contract import NoAnswer
-from fras_common.codec import decode
+from fras_common.bus.contract import NoAnswer, OnMalformed, RawSample
+from fras_common.codec import MalformedMessage, decode
 from fras_common.errors import FrasError
 from fras_common.messages import Header
 from fras_common.provenance import require_source
@@ -53,6 +53,36 @@ def received(topic: Topic[M], payload: bytes, key: str) -> M:
     message = decode(topic.type, payload, key, topic.max_bytes)
     require_source(key, message.source)
     return message
+
+
+class Newest(Generic[M]):
+    """Decodes what came last on a key, once it is looked at.
+
+    Parameters
+    ----------
+    topic : Topic
+    fetch : callable
+        Gives the newest sample since the last time, or None.
+    on_malformed : callable
+        Gets a payload that did not fit.
+    """
+
+    def __init__(
+        self, topic: Topic[M], fetch: Callable[[], RawSample | None], on_malformed: OnMalformed
+    ) -> None:
+        self._topic = topic
+        self._fetch = fetch
+        self._on_malformed = on_malformed
+
+    def take(self) -> M | None:
+        """Return the latest message since the last look; None if there is none."""
+        if (sample := self._fetch()) is None:
+            return None
+        try:
+            return received(self._topic, sample.payload, sample.key)
+        except MalformedMessage as error:
+            self._on_malformed(error)
+            return None
 
 
 class Answer(Generic[T]):

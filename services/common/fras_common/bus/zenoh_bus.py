@@ -25,11 +25,11 @@ from fras_common.bus.contract import (
     OnMalformed,
     RawSample,
 )
-from fras_common.bus.hearing import Hearing
+from fras_common.bus.hearing import Asker, Hearing
 from fras_common.bus.past import CACHES, Cached, Past
 from fras_common.bus.recovery import ALL_OF_WHO_BEGINS, Earlier
 from fras_common.bus.settings import NoRouter, client_settings
-from fras_common.bus.shared import Answer, Stamper, received, wait_for
+from fras_common.bus.shared import Answer, Newest, Stamper, received, wait_for
 from fras_common.bus.zenoh_wire import ENCODING, ZenohCall, configured, numbered, outcome, raw
 from fras_common.codec import MalformedMessage, decode, encode
 from fras_common.errors import FrasError
@@ -98,6 +98,7 @@ class ZenohBus:
         self._clock_ns = clock_ns
         self._closed = False
         self._declared: list[Any] = []
+        self._asker = Asker()
         try:
             settings = client_settings(cell, connect, open_timeout_s, identity)
             self._session = zenoh.open(configured(settings))
@@ -173,13 +174,27 @@ class ZenohBus:
             self._session.declare_subscriber(topic.wildcard, lambda sample: deliver(raw(sample)))
         )
 
+    def latest(self, topic: Topic[M]) -> Newest[M]:
+        """Look at a concrete key now and then; Zenoh keeps one, and wakes nobody."""
+        self.require_open()
+        ring = cast(Any, zenoh.handlers.RingChannel(1))
+        declared: Any = self._session.declare_subscriber(topic.key, ring)
+        self._declared.append(declared)
+
+        def fetch() -> RawSample | None:
+            if self._closed or (sample := declared.try_recv()) is None:
+                return None
+            return raw(sample)
+
+        return Newest(topic, fetch, self._on_malformed)
+
     def subscribe_raw(self, key_expr: str, callback: Callable[[RawSample], None]) -> None:
         """Receive samples undecoded, from now on."""
         self._hear(key_expr, callback, ALL_OF_WHO_BEGINS)
 
     def _hear(self, key_expr: str, callback: Callable[[RawSample], None], earlier: Earlier) -> None:
         self.require_open()
-        hearing = Hearing(self._get_cached, callback, earlier)
+        hearing = Hearing(self._asker, self._get_cached, callback, earlier)
 
         def note(sample: zenoh.Sample) -> None:
             if (heard := numbered(sample)) is not None:
@@ -195,7 +210,6 @@ class ZenohBus:
                 publisher = "/".join(name.split("/")[:2])
                 hearing.note_latest(key, publisher, int.from_bytes(payload, "little"))
 
-        self._declared.append(hearing)
         for key, tell in ((key_expr, note), (f"{key_expr}{CACHES}**", note_latest)):
             self._declared.append(self._session.declare_subscriber(key, tell))
         hearing.ask_latest(key_expr)
@@ -333,6 +347,7 @@ class ZenohBus:
         for declared in reversed(self._declared):
             declared.undeclare()
         self._declared.clear()
+        self._asker.close()
         self._session.close()
 
     def require_open(self) -> None:

@@ -7,12 +7,13 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from fras_common.messages import TissueState
+from fras_common.messages import RobotState, TissueState
 from fras_log.colours import ATTACHMENT, ROI, rgb
+from fras_log.export.instruments import instrument
 from fras_monitor.commands import Colouring, Place
 from fras_monitor.page.door import PAGE, WHO
 from fras_monitor.picture import Picture
-from fras_monitor.shapes import FloatArray, Mesh, ball, ring
+from fras_monitor.shapes import FloatArray, Mesh, ball, instrument_mesh, ring
 from fras_monitor.stage import (
     ABOVE_M,
     CLEAR_M,
@@ -21,7 +22,6 @@ from fras_monitor.stage import (
     Ground,
     blocks_of,
     ground_of,
-    instruments_of,
     kinds_of,
     magnitudes_n,
     path_of,
@@ -78,6 +78,7 @@ class Scene:
         self._blocks: Blocks | None = None
         self._nodes: dict[str, Any] = {}
         self._drawn: tuple[object, ...] = ()
+        self._stand: dict[str, tuple[object, ...]] = {}
         self._eyes: dict[str, viser.ClientHandle] = {}
         self._prepare()
 
@@ -123,14 +124,14 @@ class Scene:
             if tissue is not None:
                 self._draw_tissue(picture, tissue)
             if robot is not None:
-                for name, mesh in instruments_of(robot).items():
-                    self._mesh(f"/instruments/{name}", mesh, ARM_COLOURS.get(name, COVERED))
+                self._draw_instruments(robot)
 
     def _clear(self) -> None:
         for handle in self._nodes.values():
             handle.remove()
         self._nodes.clear()
         self._ground, self._blocks, self._drawn = None, None, ()
+        self._stand.clear()
 
     def _set_up(self, ground: Ground) -> None:
         self._ground = ground
@@ -182,10 +183,20 @@ class Scene:
         if context is not None:
             plan = picture.plan
             kinds = kinds_of(context, plan.target if plan is not None else "")
-            if self._blocks is None or not self._blocks.exact:
+            # Of a context that was heard in mid-trial only the middles of the cells are known.
+            is_better = context.tick == tissue.tick
+            if self._blocks is None or (is_better and not self._blocks.exact):
                 self._blocks = blocks_of(context, ground, tissue)
             self._draw_blocks(self._blocks, kinds, nodes_m)
             self._draw_path(picture, self._blocks, nodes_m)
+
+    def _draw_instruments(self, robot: RobotState) -> None:
+        for name, arm in robot.arms.items():
+            stands = (arm.tip_in_world, arm.joints, arm.jaw_rad)
+            if self._stand.get(name) != stands:
+                self._stand[name] = stands
+                colour = ARM_COLOURS.get(name, COVERED)
+                self._mesh(f"/instruments/{name}", instrument_mesh(instrument(arm)), colour)
 
     def _draw_blocks(self, blocks: Blocks, kinds: Sequence[BlockKind], nodes_m: FloatArray) -> None:
         places = (blocks.carried.places_m(nodes_m) + ABOVE_M).astype(np.float32)

@@ -14,6 +14,7 @@ from fras_planner.planning.errors import (
     UnknownFluent,
     UnknownGoal,
 )
+from fras_planner.planning.parsed import Parsed, parse
 from fras_planner.planning.plan import NoPlan, Plan, PlannedAction, WhyNot
 from fras_planner.planning.program import Knowledge
 from fras_planner.planning.scene import Context, PlanningScene
@@ -27,6 +28,7 @@ __all__ = [
     "Knowledge",
     "KnowledgeFault",
     "NoPlan",
+    "Parsed",
     "Plan",
     "PlannedAction",
     "Planner",
@@ -42,5 +44,6 @@ __all__ = [
     "UnknownGoal",
     "Violation",
     "WhyNot",
+    "parse",
     "verify",
 ]

@@ -31,7 +31,14 @@ class Story:
     explanation: tuple[str, ...]
 
 
-def tell_plan(knowledge: Knowledge, facts: Iterable[str], steps: int) -> Story:
+def telling_program(knowledge: Knowledge) -> Program:
+    """Parse what tells a plan."""
+    return Program(knowledge, TELL_FILES, ())
+
+
+def tell_plan(
+    knowledge: Knowledge, facts: Iterable[str], steps: int, program: Program | None = None
+) -> Story:
     """Tell a plan.
 
     Parameters
@@ -41,10 +48,11 @@ def tell_plan(knowledge: Knowledge, facts: Iterable[str], steps: int) -> Story:
         The model's shown atoms, its context, the scene's facts about the blocks involved.
     steps : int
         Steps of the plan, the last one included at which the goal holds.
+    program : Program, optional
+        A `telling_program` that nothing was told with yet.
     """
-    told = _told(
-        knowledge, [*facts, f"step(1..{steps})"], ("history", "explain", "because"), TELL_FILES
-    )
+    told = program if program is not None else telling_program(knowledge)
+    _ground(told, [*facts, f"step(1..{steps})"], ("history", "explain", "because"))
     expected: dict[int, list[str]] = defaultdict(list)
     for t, atom in told.rows("expected", 2):
         expected[t.number].append(str(atom))
@@ -97,10 +105,14 @@ def _told(
     files: Sequence[str],
 ) -> Program:
     program = Program(knowledge, files, ())
-    program.ground(*((part, ()) for part in ("base", *parts)), facts=facts)
-    # Facts in, facts out: grounding has done all the work, no search is needed. The program is
-    # handed on whole, because its atoms are gone with it.
+    _ground(program, facts, parts)
+    # The program is handed on whole, because its atoms are gone with it.
     return program
+
+
+def _ground(program: Program, facts: Iterable[str], parts: Sequence[str]) -> None:
+    """Facts in, facts out: grounding does all the work, no search is needed."""
+    program.ground(*((part, ()) for part in ("base", *parts)), facts=facts)
 
 
 def _sentences(knowledge: Knowledge, told: Program) -> tuple[str, ...]:

@@ -11,7 +11,6 @@ from fras_planner.planning.errors import (
     SceneChanged,
     SceneOutOfBounds,
     UnknownBlock,
-    UnknownGoal,
 )
 from fras_planner.planning.measures import NAME
 from fras_planner.planning.narrator import (
@@ -22,18 +21,17 @@ from fras_planner.planning.narrator import (
 )
 from fras_planner.planning.no_plan import minimal_core
 from fras_planner.planning.occasion import Evidence, occasion
+from fras_planner.planning.parsed import CONFLICT_BUDGET, SEED, Parsed, parse
 from fras_planner.planning.plan import NoPlan, Plan, WhyNot
-from fras_planner.planning.program import PLAN_FILES, Knowledge, Program
+from fras_planner.planning.program import Knowledge, Program
 from fras_planner.planning.scene import PlanningScene
 from fras_planner.planning.scene_facts import SceneFacts
 from fras_planner.planning.search import Best, OutOfTime, Search
 from fras_planner.planning.signature import STATIC, exclusion, normalised
 
-GOALS = ("visible", "clear")
 # Both arms let go, then reach, grasp and pull: no plan of these rules needs more.
 HORIZON = 5
 MAX_HORIZON = 50
-CONFLICT_BUDGET = 200_000
 # A thousand times what a plan takes.
 TIME_LIMIT_S = 5.0
 # Actions of the block chosen for the next grasp (`actions.lp`).
@@ -68,6 +66,9 @@ class Planner:
     clock : callable, optional
         Returns seconds, for `time_limit_s` and the times in a plan; without one these are 0, and
         the limit is that of each search.
+    parsed : Parsed, optional
+        Of the same knowledge, criterion, goal, seed and budget, and used by no other planner;
+        without it the rules are parsed now.
 
     Raises
     ------
@@ -82,16 +83,18 @@ class Planner:
         criterion: str = "weighted",
         goal: str = "visible",
         horizon: int = HORIZON,
-        seed: int = 1,
+        seed: int = SEED,
         conflict_budget: int = CONFLICT_BUDGET,
         time_limit_s: float = TIME_LIMIT_S,
         clock: Callable[[], float] = _no_clock,
+        parsed: Parsed | None = None,
     ) -> None:
         began = clock()
-        if goal not in GOALS:
-            raise UnknownGoal(goal, GOALS)
         if not 1 <= horizon <= MAX_HORIZON:
             raise SceneOutOfBounds("horizon", horizon, f"1 to {MAX_HORIZON} actions")
+        if parsed is None:
+            parsed = parse(knowledge, criterion, goal, seed, conflict_budget)
+        self._telling: Program | None = parsed.telling
         self._preference = knowledge.preference_file(criterion)
         self.scene = scene
         self.criterion = criterion
@@ -103,20 +106,11 @@ class Planner:
         # The file itself tells whether it ranks by sums over all attachments, the costly measure.
         sums = "attachment_distance_" in knowledge.files[self._preference]
         self._facts = SceneFacts(knowledge.alphabet, scene, sums=sums)
-        options = [
-            f"--const=goal={goal}",
-            f"--seed={seed}",
-            f"--solve-limit={conflict_budget}",
-            "--parallel-mode=1",
-            "--heuristic=Domain",
-            "--opt-strategy=bb,lin",
-        ]
-        program = Program(knowledge, [*PLAN_FILES, self._preference], options)
         last = horizon + 1
         steps = [("step", (t,)) for t in range(1, last + 1)]
         parts = [("signature", ()), ("base", ()), *steps, ("check", (last,))]
-        program.ground(*parts, facts=self._facts.all)
-        self._control = program.control
+        parsed.planning.ground(*parts, facts=self._facts.all)
+        self._control = parsed.planning.control
         self._search = Search(self._control, time_limit_s, clock)
         self._control.assign_external(clingo.Function("query", [clingo.Number(last)]), True)
         self._rules = {
@@ -193,7 +187,8 @@ class Planner:
         steps = 1 + len(best.named("occurs"))
         about = [*self._facts_about(best, sensed, steps), *occasion(reason, evidence or {}, sensed)]
         began = self._clock()
-        story = tell_plan(self._knowledge, about, steps)
+        story = tell_plan(self._knowledge, about, steps, self._telling)
+        self._telling = None
         told_s = self._clock() - began
         arm, target = story.actions[0].args[0] if story.actions else "", ""
         for row in best.named("target"):

@@ -7,10 +7,12 @@ from typing import Final
 from matplotlib.figure import Figure
 
 from fras_experiments.results.figures.distributions import draw_distributions
+from fras_experiments.results.figures.effects import draw_effects
 from fras_experiments.results.figures.force import draw_force
 from fras_experiments.results.figures.grasps import draw_grasps
 from fras_experiments.results.figures.limit import draw_limit
 from fras_experiments.results.figures.planning import draw_planning
+from fras_experiments.results.figures.tradeoff import draw_tradeoff
 from fras_experiments.results.figures.twin import draw_twin
 from fras_experiments.results.reading import Results
 
@@ -57,6 +59,17 @@ FIGURES: Final = {
         "Planning time against N on logarithmic axes, by f, the share that is attached: ours "
         "(points: trials; marks: medians; line: power law through them) and the paper's means "
         "(Table I, dashed). Beside it, where trials re-planned: B keeps the grasp, C releases it.",
+    ),
+    "tradeoff": Drawn(
+        draw_tradeoff,
+        "What is seen, and its price: visibility at the end against the share of trials that "
+        "reached the limit, and scenes with less than 98 % in view against the largest force; a "
+        "mark a point of the sweep, with 95 % intervals.",
+    ),
+    "effects": Drawn(
+        draw_effects,
+        "What each point of the sweep changes against the first one, over the same scenes: mean "
+        "differences with their 95 % intervals, in colour where the interval does not hold zero.",
     ),
     "twin": Drawn(
         draw_twin,
