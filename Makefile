@@ -1,5 +1,5 @@
 # The two commands of the README are `make run` and `make test`; both install what is missing.
-.PHONY: help install run test test-full check format bench reference docs browser screenshots clean
+.PHONY: help install run test test-full check format bench reference docs browser screenshots dist extras sbom licences clean
 
 PYTHON ?= python3
 VENV := .venv
@@ -87,6 +87,18 @@ docs: $(VENV)/.installed-dev ## build the documentation as a site in build/site/
 
 screenshots: $(VENV)/.installed-dev browser ## take the pictures of docs/tour.md anew
 	$(BIN)/python -m benchmarks.page_pictures
+
+dist: $(VENV)/.installed-dev ## build sdist and wheel into dist/
+	$(BIN)/python -m build --no-isolation
+
+extras: dist ## try each extra of the wheel alone, in an empty environment (long: it installs them all)
+	$(BIN)/python -m release.extras
+
+sbom: $(VENV)/.installed-dev ## write dist/sbom.cdx.json, a bill of materials of the pins
+	$(BIN)/python -m release.sbom
+
+licences: $(VENV)/.installed-dev ## write docs/licences.md
+	$(BIN)/python -m release.licences
 
 clean: ## remove what was built; runs/ stays
 	rm -rf $(VENV) build dist .pytest_cache .ruff_cache .import_linter_cache .hypothesis

@@ -66,7 +66,7 @@ def test_it_is_what_the_specification_allows(name: str) -> None:
         ("restart: on-failure:5", "restart: sometimes"),
         ("condition: service_healthy", "condition: service_wealthy"),
         ("    init: true", "    inti: true"),
-        ("start_period: 60000ms", "start_period: soon"),
+        ("start_period: 180000ms", "start_period: soon"),
         ("retries: 3", "retries: many"),
         ("127.0.0.1:7447:7447", "127.0.0.1:x:7447"),
     ],

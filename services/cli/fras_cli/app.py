@@ -44,11 +44,11 @@ for _name, _named in {
     app.add_typer(_named, name=_name)
 
 
-def _print_version(asked: bool) -> None:
+def _print_version(context: typer.Context, asked: bool) -> None:
     if asked:
-        from importlib.metadata import version
+        from fras_cli.version import print_version
 
-        print(f"fras {version('fras')}")
+        print_version(as_json=context.params["json"])
         raise typer.Exit
 
 
@@ -56,10 +56,20 @@ def _print_version(asked: bool) -> None:
 def common(
     version: Annotated[
         bool,
-        typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version."),
+        typer.Option(
+            "--version",
+            callback=_print_version,
+            help="Show the version, and what it was built from and runs on.",
+        ),
+    ] = False,
+    # Eager, so that it is known when the version is printed.
+    json: Annotated[
+        bool, typer.Option("--json", is_eager=True, help="With --version: as JSON.")
     ] = False,
 ) -> None:
     """Autonomous tissue retraction: plan, watch, move, explain, record."""
+    if json:
+        raise typer.BadParameter("it goes with --version, or behind a command", param_hint="--json")
 
 
 def main() -> None:

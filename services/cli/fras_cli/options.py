@@ -10,6 +10,7 @@ import msgspec
 from fras_cli.mesh_input import mesh_path, read_mesh_file
 from fras_common.scenario import Scenario, ScenarioError, check, load, resolve, to_toml
 from fras_common.scenario.loader import convert
+from fras_common.shipped import shipped
 
 COMMAND_LINE = "command line"
 
@@ -33,11 +34,8 @@ def find_scenario(text: str) -> Path:
 
 
 def shipped_scenarios() -> Path:
-    """Folder of the scenarios that come with FRAS: in the package, else in the checkout."""
-    import fras_supervisor
-
-    packaged = Path(fras_supervisor.__file__).parent / "compose" / "scenarios"
-    return packaged if packaged.is_dir() else packaged.parents[4] / "compose" / "scenarios"
+    """Folder of the scenarios that come with FRAS."""
+    return shipped("compose") / "scenarios"
 
 
 def choose_seeds(seed: int | None, seeds: str | None) -> list[int | None]:

@@ -6,11 +6,9 @@ from pathlib import Path
 
 from fras_common.digests import rules_digest
 from fras_common.errors import FrasError
+from fras_common.shipped import shipped_places
 from fras_planner.planning import Knowledge, KnowledgeFault, Planner, PlanningScene
 
-_HERE = Path(__file__).resolve().parent
-# Wheels carry the rules inside the package; a checkout has them at its root.
-_PLACES = (_HERE / "asp", _HERE.parents[2] / "asp")
 # In comments, too: what is a comment is clingo's to say, and rules may come from anywhere.
 _OUTSIDE = re.compile(r"#\s*(include|script|begin_lua|begin_python)\b")
 
@@ -40,7 +38,7 @@ def load_knowledge(asp_dir: Path | None = None) -> Knowledge:
     KnowledgeFault
         If there is no such folder, or clingo finds fault with a file.
     """
-    places = (asp_dir,) if asp_dir is not None else _PLACES
+    places = (asp_dir,) if asp_dir is not None else shipped_places("asp")
     folder = next((place for place in places if (place / "domain.lp").is_file()), None)
     if folder is None:
         looked = " or ".join(str(place) for place in places)

@@ -12,6 +12,7 @@ import msgspec
 from msgspec import Meta
 
 from fras_common.files import TEXT_BYTES, read_at_most
+from fras_common.shipped import shipped_places
 from fras_supervisor.errors import TableError
 from fras_supervisor.hosts import check_hosts, placeholder, read_hosts, services_placeholder
 from fras_supervisor.order import ended_before, find_cycle
@@ -98,7 +99,7 @@ class Process(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     needs: tuple[str, ...] = ()
     outlives: tuple[str, ...] = ()
     readiness: Readiness = "token"
-    ready_timeout_s: Seconds = 60.0
+    ready_timeout_s: Seconds = 180.0
     restart: Restart = "never"
     host: Annotated[str, Meta(pattern=r"^[A-Za-z0-9][A-Za-z0-9.-]*$")] = "localhost"
     stop_timeout_s: Seconds = 5.0
@@ -171,13 +172,12 @@ class Table(msgspec.Struct, frozen=True):
 
 def find_table(name: str = "local") -> Path:
     """Path of `compose/<name>.toml`: in the installed package, else in the checkout."""
-    here = Path(__file__).resolve()
-    places = (here.parent / "compose", here.parents[3] / "compose")
+    places = shipped_places("compose")
     for place in places:
         if (path := place / f"{name}.toml").is_file():
             return path
     known = sorted(path.stem for place in places for path in place.glob("*.toml"))
-    raise TableError(f"{places[0]} or {places[1]}", "table", name, ", ".join(known) or "none found")
+    raise TableError(" or ".join(map(str, places)), "table", name, ", ".join(known) or "none found")
 
 
 def load_table(path: Path | str, placeholders: Collection[str] = PLACEHOLDERS) -> Table:

@@ -26,8 +26,22 @@ PlanId = Annotated[
     str, typer.Option(help="Only this one, by its id.", show_default="the one that waits")
 ]
 RouterPort = Annotated[int, typer.Option(help="Port of the router.")]
+
+
+def _shipped_names(incomplete: str) -> list[str]:
+    """Complete the name of a scenario of ours; a shell completes files by itself."""
+    from fras_common.shipped import shipped
+
+    names = sorted(path.stem for path in (shipped("compose") / "scenarios").glob("*.toml"))
+    return [name for name in names if name.startswith(incomplete)]
+
+
 ScenarioName = Annotated[
-    str, typer.Argument(help="A scenario file, or of ours: default, a, b, c, slab.")
+    str,
+    typer.Argument(
+        help="A scenario file, or of ours: default, a, b, c, slab, twin.",
+        autocompletion=_shipped_names,
+    ),
 ]
 SERVICE_ARGUMENTS: Final[dict[str, Any]] = {
     "allow_extra_args": True,

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from fras_common.service.build import build_of_this_process
+from fras_common.shipped import shipped
 from fras_supervisor import find_table
 
 PACKAGES: Final = (
@@ -47,16 +48,14 @@ def code_version() -> str:
 
 def _files() -> list[tuple[str, Path]]:
     """Files with names that do not depend on where they are installed."""
+    rules = shipped("asp")
     found = [("local.toml", find_table("local"))]
+    found += [(f"asp/{_name(one, rules)}", one) for one in rules.rglob("*.lp")]
     for package in PACKAGES:
         spec = find_spec(package)
         for place in (spec.submodule_search_locations or []) if spec else []:
             folder = Path(place)
             found += [(f"{package}/{_name(one, folder)}", one) for one in folder.rglob("*.py")]
-            if package == "fras_planner":
-                # In a wheel the rules are part of the package, in a checkout they stand beside.
-                rules = folder / "asp" if (folder / "asp").is_dir() else folder.parents[2] / "asp"
-                found += [(f"asp/{_name(one, rules)}", one) for one in rules.rglob("*.lp")]
     return sorted(found)
 
 

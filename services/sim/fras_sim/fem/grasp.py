@@ -19,6 +19,9 @@ DISTANCE_ROUNDING_M = 1e-9
 class ToolInput:
     """Where a tool is in one tick.
 
+    A tool grasps in the tick in which its jaw closes, and lets go in the one in which it opens:
+    show it open first, with `TissueSimulator.measure` or a step.
+
     Parameters
     ----------
     position_m : ndarray, shape (3,), float64 [m]
