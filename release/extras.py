@@ -99,7 +99,7 @@ TRIALS: Final = {
     "bench": Trial(commands=(("python", "-c", "import felupe, mujoco, pypardiso"),)),
     "all": Trial(commands=(A_TRIAL, ("fras", "audit", "out"))),
 }
-WITHOUT: Final = {"dev": "it is where this runs"}
+WITHOUT: Final = {"dev": "it is where this runs", "docs": "`make docs` builds the site with it"}
 
 
 def check_installed(environment: Environment, extras: Sequence[str]) -> int:

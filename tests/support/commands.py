@@ -44,13 +44,15 @@ def commands(text: str) -> Iterator[list[str]]:
 
 def check(words: list[str], page: Path) -> None:
     """Refuse a command that does not exist, or has not these options; none is run."""
+    # As an environment of another name has it: theatre/bin/fras.
+    words = [Path(words[0]).name, *words[1:]]
     program, *rest = words
     if "fras" in words:
         check_fras(words[words.index("fras") + 1 :])
     elif program == "make":
         targets = re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE)
         assert set(rest) <= set(targets), words
-    elif program == "python":
+    elif program in {"python", "python3"}:
         check_python(rest, page)
     else:
         assert program in SHELLS | OTHERS, words
@@ -69,6 +71,10 @@ def check_fras(words: list[str]) -> None:
     parser: Any = typer.main.get_command(app)
     context: Any = None
     name = "fras"
+    if not words or words[0] == "--install-completion":
+        # It would do so; without anything it shows its help.
+        assert not words or any(words[0] in option.opts for option in parser.params), words
+        return
     try:
         while hasattr(parser, "commands"):
             context = parser.make_context(name, list(words), parent=context)
