@@ -43,7 +43,8 @@ from fras_replay import (
     Settings,
     read_recording,
 )
-from fras_replay.service import LINGER_NS, SPIN_NS
+from fras_replay.service import LINGER_NS
+from fras_replay.waiting import SPIN_NS
 
 NS = 1e9
 TARGET_P99_MS = 2.0

@@ -378,7 +378,7 @@ def test_a_state_that_nobody_answers_is_said_again(
     theatre: Theatre, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Those who come back, and a router, may have lost it; in mid-action they are given time."""
-    monkeypatch.setattr("fras_motion.service.SAY_AGAIN_S", 0.05)
+    monkeypatch.setattr("fras_motion.tick_loop.SAY_AGAIN_S", 0.05)
     theatre.act("g1")
     theatre.bench.client.announce("ready/sim")
     theatre.bench.settle()

@@ -47,7 +47,7 @@ class Bench(ShellBench):
     def __init__(self, patch: pytest.MonkeyPatch) -> None:
         self.now_s = 100.0
         watch = partial(page_watch.PageWatch, clock=lambda: self.now_s)
-        patch.setattr("fras_motion.service.PageWatch", watch)
+        patch.setattr("fras_motion.tick_loop.PageWatch", watch)
         super().__init__("motion", MotionService, client="sa/test")
         self.client.serve(RECORDER_LAST, lambda call: call.reply(LastReply(payload=b"")))
         self.client.announce("alive/recorder")

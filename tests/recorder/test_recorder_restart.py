@@ -14,7 +14,7 @@ from fras_common.service.health import ProcessMeter
 from fras_common.topics import RECORDER_LAST, RECORDER_SINCE, ROBOT_STATE
 from fras_log import LogFile, LogReader, verify_file
 from fras_log.parts import parts_of
-from fras_recorder import service, writing
+from fras_recorder import opening, writing
 
 Stage = Any  # the fixture's class, in conftest.py, can't be imported from here
 
@@ -218,7 +218,7 @@ def test_one_that_falls_behind_while_the_log_is_made_says_so_when_it_is(
     monkeypatch.setattr(writing, "BEHIND", 5 / writing.PLACES)
     stage.until("idle")
     made, told = threading.Event(), threading.Event()
-    make = service.open_log
+    make = opening.open_log
     done_with = writing.Writing._done_with  # noqa: SLF001 - nothing is written before it was told
 
     def slow(*arguments: Any) -> Any:
@@ -229,16 +229,16 @@ def test_one_that_falls_behind_while_the_log_is_made_says_so_when_it_is(
         assert told.wait(20.0)
         done_with(one, sample)
 
-    monkeypatch.setattr(service, "open_log", slow)
+    monkeypatch.setattr(opening, "open_log", slow)
     monkeypatch.setattr(writing.Writing, "_done_with", held)
-    opening = threading.Thread(target=stage.open, args=(tmp_path,))
-    opening.start()
+    asking = threading.Thread(target=stage.open, args=(tmp_path,))
+    asking.start()
     while stage.service._writing.waiting < 8:  # noqa: SLF001
         stage.verdict(0)
     made.set()
     assert "wait to be written" in stage.until("behind").reason
     told.set()
-    opening.join()
+    asking.join()
     stage.until_last("recording")
 
 

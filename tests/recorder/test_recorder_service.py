@@ -20,7 +20,6 @@ from fras_common.service.build import build_of_this_process
 from fras_common.topics import HEALTH, QUERIES, RECORDER_LAST, RECORDER_SINCE, TOPICS
 from fras_log import LogFile, verify_file
 from fras_log.attachments import read_attachments, rules_in
-from fras_recorder import service as recorder
 from fras_recorder import writing
 from support.verdicts import verdict
 
@@ -103,7 +102,7 @@ def test_the_log_carries_the_rules_that_came_with_the_request(stage: Stage, tmp_
 def test_the_close_waits_for_the_last_tick_of_each_key(
     stage: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    monkeypatch.setattr(recorder, "QUIET_S", 0.0)
+    monkeypatch.setattr("fras_recorder.closing.QUIET_S", 0.0)
     stage.open(tmp_path)
     stage.tick(0)
     status = stage.task()
@@ -120,7 +119,7 @@ def test_the_close_waits_for_the_last_tick_of_each_key(
 def test_the_close_waits_for_the_status(
     stage: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    monkeypatch.setattr(recorder, "QUIET_S", 0.0)
+    monkeypatch.setattr("fras_recorder.closing.QUIET_S", 0.0)
     stage.open(tmp_path)
     stage.tick(0)
     first = stage.task()
@@ -135,7 +134,7 @@ def test_the_close_waits_for_the_status(
 def test_the_close_waits_for_a_moment_of_quiet(
     stage: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    monkeypatch.setattr(recorder, "QUIET_S", 0.5)
+    monkeypatch.setattr("fras_recorder.closing.QUIET_S", 0.5)
     stage.open(tmp_path)
     stage.tick(0)
     status = stage.task()
@@ -150,7 +149,7 @@ def test_the_close_waits_for_a_moment_of_quiet(
 def test_a_log_that_never_gets_complete_is_closed_in_the_end(
     stage: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    monkeypatch.setattr(recorder, "CLOSE_TIMEOUT_S", 0.1)
+    monkeypatch.setattr("fras_recorder.closing.CLOSE_TIMEOUT_S", 0.1)
     stage.open(tmp_path)
     stage.tick(0)
     assert isinstance(stage.ask_close(99, 99).wait(), CloseReply)

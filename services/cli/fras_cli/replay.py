@@ -19,6 +19,7 @@ from fras_cli.replay_keys import HELP, command_of, watched_terminal
 from fras_cli.run import EXIT_OK
 from fras_common.bus.zenoh_bus import ZenohBus
 from fras_common.errors import FrasError
+from fras_common.messages import ReplayStatus
 from fras_common.service import run_shell
 from fras_common.service.logs import configure_logging
 from fras_common.signals import StopFlag
@@ -226,7 +227,7 @@ def _run(
         def on_key(key: bytes) -> None:
             host.post(lambda: _told(service, key))
 
-        with watched_terminal(on_key, lambda: _line(service)):
+        with watched_terminal(on_key, lambda: _line(service.status(), recording)):
             run_shell(host, service, stop)
         _say_end(service, console)
     finally:
@@ -246,9 +247,8 @@ def _told(service: ReplayService, key: bytes) -> None:
             sys.stderr.write(f"\r\x1b[K{error}\n")
 
 
-def _line(service: ReplayService) -> str:
-    status = service.status()
-    mark = service.mark_text(status.mark)
+def _line(status: ReplayStatus, recording: Recording) -> str:
+    mark = recording.mark_text(status.mark)
     return in_words(status) + (f" | {mark}" if mark else "")
 
 

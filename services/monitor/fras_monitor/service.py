@@ -8,11 +8,9 @@ from typing import Final
 import msgspec
 import rich
 
-from fras_common import messages as m
-from fras_common.errors import FrasError
 from fras_common.service import ServiceHost
-from fras_common.topics import PRESENCE, REPLAY_STATUS
 from fras_monitor.access import Policy, query_of, require_closed
+from fras_monitor.audience import Audience
 from fras_monitor.commands import AnyCommand, Colouring, Look, Stop
 from fras_monitor.desk import Desk
 from fras_monitor.listening import Listener
@@ -21,16 +19,14 @@ from fras_monitor.page.door import Door
 from fras_monitor.page.hub import Hub
 from fras_monitor.page.scene import Scene
 from fras_monitor.picture import Picture
+from fras_monitor.replay_watch import ReplayWatch
 from fras_monitor.stop import Stopper
 from fras_monitor.view import course_of, holds_of, view_of
 
 FRAME_S: Final = 0.05
 VIEW_S: Final = 0.1
 COURSE_S: Final = 0.25
-PRESENCE_S: Final = 0.25
-REPLAY_S: Final = 0.1
 BEATS_A_SECOND: Final = 4
-ANSWER_S: Final = 2.0
 
 
 class MonitorService:
@@ -61,17 +57,16 @@ class MonitorService:
         require_closed(bind, policy)
         self._host = host
         self._frame, self._view, self._course = Due(FRAME_S), Due(VIEW_S), Due(COURSE_S)
-        self._presence_due, self._replay = Due(PRESENCE_S), Due(REPLAY_S)
-        self._looking = (0, 0)
         # No supervisor keeps the page, and so none says which process it is.
         host.facts["pid"] = str(os.getpid())
-        self._presence = host.publisher(PRESENCE)
+        self._audience = Audience(host)
         self.stopper = Stopper(host.bus)
         self._hub = Hub(f"{time.time_ns():x}", self._on_command)
         door = Door(bind, port, policy, self._hub.attend)
         self._server = door.open()
         self._scene = Scene(self._server, self._on_block)
         self._listener = Listener(host, self.stopper.see)
+        self._replay = ReplayWatch(host, self._listener)
         self._desk = Desk(
             host.bus,
             self.stopper,
@@ -110,7 +105,7 @@ class MonitorService:
         self._host.tick = picture.robot.message.tick if picture.robot is not None else -1
         if picture.holds is not None:
             self.stopper.see_holds(picture.holds.message.holds, picture.holds.at_s)
-        self._say_who_looks(now_s)
+        self._audience.tell(self._hub, self.address, now_s)
         if self._view.take(now_s):
             self._show(picture, now_s)
         self._scene.draw(picture)
@@ -122,22 +117,7 @@ class MonitorService:
         self._hub.publish({**view, "colouring": self._scene.colouring, "beat": beat})
         if self._course.take(now_s):
             self._hub.publish({"course": msgspec.to_builtins(course_of(picture))})
-        if picture.is_replay and self._replay.take(now_s):
-            request = m.ReplayStatusRequest(marks=picture.replay is None)
-            self._host.bus.ask(REPLAY_STATUS, request, self._on_replay, ANSWER_S)
-
-    def _say_who_looks(self, now_s: float) -> None:
-        looking = self._hub.counts(now_s)
-        if self._presence_due.take(now_s) or looking != self._looking:
-            self._looking = looking
-            surgeons, viewers = looking
-            self._presence.put(m.Presence(viewers=surgeons, read_only=viewers))
-            self._host.facts |= {"pages": str(surgeons + viewers), "address": self.address}
-
-    def _on_replay(self, answer: m.ReplayStatus | FrasError) -> None:
-        # One that has just ended answers no more; its token goes, too, and with it the time line.
-        if isinstance(answer, m.ReplayStatus):
-            self._listener.note(answer)
+        self._replay.ask(picture, now_s)
 
     def close(self) -> None:
         """End the page; who has it open sees that."""

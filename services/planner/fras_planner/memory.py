@@ -70,13 +70,19 @@ class Resumption:
         return known
 
     @property
-    def proposal(self) -> Proposal | None:
-        """The plan that waits for a person's approval; None if none does, or it is forgotten."""
+    def followed(self) -> tuple[Plan, Context] | None:
+        """The plan that is followed, and what it was made from; None if either is forgotten."""
         plan = self.plans.get(self.status.plan)
         context = self.contexts.get(self.status.plan)
-        if self.status.phase != "awaiting_approval" or plan is None or context is None:
+        return (plan, context) if plan is not None and context is not None else None
+
+    @property
+    def proposal(self) -> Proposal | None:
+        """The plan that waits for a person's approval; None if none does, or it is forgotten."""
+        followed = self.followed
+        if self.status.phase != "awaiting_approval" or followed is None:
             return None
-        return Proposal(plan, context)
+        return Proposal(*followed)
 
 
 def first_status(trial: str) -> TaskStatus:

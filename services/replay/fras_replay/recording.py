@@ -121,6 +121,13 @@ class Recording:
         by_time = bisect_right([mark.place.at_ns for mark in self.marks], place.at_ns - back_ns)
         return min(by_order, by_time) - 1
 
+    def mark_text(self, number: int) -> str:
+        """Return what a mark tells, in words; empty for none."""
+        if number < 0:
+            return ""
+        told = self.marks[number].told
+        return f"{told.kind} {told.text}"
+
     def close(self) -> None:
         """Give the scratch file back."""
         self._scratch.close()

@@ -5,29 +5,23 @@ from collections.abc import Callable
 
 from fras_common import messages as m
 from fras_common.codec import content_digest
-from fras_common.errors import FrasError
 from fras_common.scenario import Scenario, check
-from fras_common.service import Deferred, ServiceHost
+from fras_common.service import ServiceHost
 from fras_common.service.recall import Recall
 from fras_common.topics import (
-    CONTEXT,
     PATIENT,
     ROBOT_STATE,
-    SA_CONTEXT,
     SA_RESET,
-    SA_TARGET,
     TISSUE_MODEL,
     TISSUE_STATE,
     VERDICT,
 )
 from fras_sa.awareness import AwarenessError
-from fras_sa.errors import NothingKnown, OtherTrial, TooManyQuestions
+from fras_sa.errors import NothingKnown
+from fras_sa.questions import Questions
 from fras_sa.resumption import TakenUp, take_up
 from fras_sa.trial import WatchedTrial
 from fras_sa.waiting import Waiting
-
-# Each is looked at again with each verdict.
-QUESTIONS = 100
 
 
 class AwarenessService:
@@ -45,26 +39,23 @@ class AwarenessService:
         self._clock = clock
         self._trial = WatchedTrial(Scenario())
         self._request: m.ResetRequest | None = None
-        self._pending: list[Deferred[m.ContextRequest, m.Context]] = []
         self._waiting = Waiting()
         self._verdict = host.publisher(VERDICT)
-        self._context = host.publisher(CONTEXT)
         host.subscribe(TISSUE_MODEL, self._on_model)
         host.subscribe(TISSUE_STATE, self._on_tissue)
         # Part of some stacks only; a trial that has one waits for it tick by tick.
         host.subscribe(PATIENT.state, self._on_patient, required=False)
         host.subscribe(ROBOT_STATE, self._on_robot)
         host.serve(SA_RESET, self._reset)
-        host.serve_deferred(SA_TARGET, self._on_target_request)
-        host.serve_deferred(SA_CONTEXT, self._on_context_request)
         self._recall = Recall(host, take_up(), self._take_up)
+        self._questions = Questions(host, self._recall, lambda: self._trial)
 
     def _reset(self, request: m.ResetRequest) -> m.ResetReply:
         check(request.scenario)
         self._recall.give_up()
         # Asked again because an answer was lost: nothing has happened since that would be undone.
         if self._trial.tick > 0 or request != self._request:
-            self._fail_pending(NothingKnown("another trial began"))
+            self._questions.fail(NothingKnown("another trial began"))
             self._trial = WatchedTrial(request.scenario)
             self._request = request
             self._host.enter_trial(request.trial)
@@ -83,16 +74,11 @@ class AwarenessService:
         self._host.enter_trial(name)
         self._host.tick = taken.trial.tick
 
-    def _fail_pending(self, error: FrasError) -> None:
-        waiting, self._pending = self._pending, []
-        for pending in waiting:
-            pending.fail(error)
-
     def _on_model(self, model: m.TissueModel) -> None:
         try:
             self._trial.see_model(model)
         except AwarenessError as error:
-            self._fail_pending(error)
+            self._questions.fail(error)
             raise
         self._judge_next()
 
@@ -123,52 +109,12 @@ class AwarenessService:
             self._host.log.info(
                 "verdict", tick=verdict.tick, level=verdict.level, force_n=verdict.max_force_n
             )
-        waiting, self._pending = self._pending, []
-        for pending in waiting:
-            self._on_context_request(pending)
-
-    def _on_context_request(self, pending: Deferred[m.ContextRequest, m.Context]) -> None:
-        """Answer, or keep the question until its tick has been judged."""
-        request, trial = pending.request, self._trial
-        if self._is_early(request.trial, lambda: self._on_context_request(pending)):
-            return
-        try:
-            self._require_trial(request.trial)
-            if trial.problem is None and (trial.verdict is None or trial.tick < request.min_tick):
-                if len(self._pending) >= QUESTIONS:
-                    raise TooManyQuestions(len(self._pending), request.min_tick)
-                self._pending.append(pending)
-                return
-            context = trial.context(request)
-        except FrasError as error:
-            pending.fail(error)
-            return
-        pending.reply(self._context.put(context))
-
-    def _on_target_request(self, pending: Deferred[m.TargetRequest, m.TargetReply]) -> None:
-        request = pending.request
-        if self._is_early(request.trial, lambda: self._on_target_request(pending)):
-            return
-        try:
-            self._require_trial(request.trial)
-            reply = self._trial.target(request)
-        except FrasError as error:
-            pending.fail(error)
-        else:
-            pending.reply(reply)
-
-    def _is_early(self, asked: str, again: Callable[[], None]) -> bool:
-        """Whether a question comes before it is known which trial is under way: it is kept."""
-        return asked != self._host.gate.trial and self._recall.keep(again)
-
-    def _require_trial(self, asked: str) -> None:
-        if asked != self._host.gate.trial:
-            raise OtherTrial(asked, self._host.gate.trial)
+        self._questions.look_again()
 
     def wake(self) -> float | None:
         """Say in health who has been waited for; ask what is to be taken up."""
         # A question about a tick of which nothing is here waits for motion to begin it.
-        missing = self._trial.missing or ("motion" if self._pending else "")
+        missing = self._trial.missing or ("motion" if self._questions.waiting else "")
         self._host.waiting_for = self._waiting.told(missing, self._clock())
         waits_s = (self._recall.wake(self._clock()), Waiting.period_s if missing else None)
         return min((wait_s for wait_s in waits_s if wait_s is not None), default=None)
