@@ -18,10 +18,12 @@ INTEL_SIMPLIFIED: Final = "LicenseRef-Intel-Simplified"
 MATPLOTLIB: Final = "LicenseRef-matplotlib"
 READ: Final = {
     "cmeel-qhull": "Qhull",
+    "colorama": "BSD-3-Clause",
     "contourpy": "BSD-3-Clause",
     "cycler": "BSD-3-Clause",
     "defusedxml": "PSF-2.0",
     "eclipse-zenoh": "EPL-2.0 OR Apache-2.0",
+    "ghp-import": "Apache-2.0",
     "grimp": "BSD-2-Clause",
     "import-linter": "BSD-2-Clause",
     "intel-cmplr-lib-ur": INTEL_EULA,
@@ -34,6 +36,7 @@ READ: Final = {
     "mcap": "MIT",
     "mcap-protobuf-support": "MIT",
     "mdurl": "MIT",
+    "mergedeep": "MIT",
     "meshio": "MIT",
     "mkl": INTEL_SIMPLIFIED,
     "nodeenv": "BSD-3-Clause",
