@@ -1,5 +1,6 @@
 """A motion that was killed stands where it stood, moves nothing, and says so."""
 
+import math
 import time
 from collections.abc import Iterator
 from typing import Any
@@ -378,11 +379,12 @@ def test_a_state_that_nobody_answers_is_said_again(
     theatre: Theatre, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Those who come back, and a router, may have lost it; in mid-action they are given time."""
-    monkeypatch.setattr("fras_motion.tick_loop.SAY_AGAIN_S", 0.05)
+    monkeypatch.setattr("fras_motion.tick_loop.SAY_AGAIN_S", math.inf)
     theatre.act("g1")
     theatre.bench.client.announce("ready/sim")
     theatre.bench.settle()
     assert len(theatre.states) == 1
+    monkeypatch.setattr("fras_motion.tick_loop.SAY_AGAIN_S", 0.05)
     deadline_s = time.monotonic() + 10.0
     while len(theatre.states) < 3 and time.monotonic() < deadline_s:
         theatre.bench.service.wake()

@@ -1,5 +1,6 @@
 """Motion's shell on an in-memory bus: interlock, patience, holds, refusals."""
 
+import math
 import time
 from collections.abc import Iterator
 from dataclasses import replace
@@ -86,7 +87,10 @@ def bench() -> Iterator[Bench]:
     made.close()
 
 
-def test_no_tick_without_the_verdict_on_the_present_one(bench: Bench) -> None:
+def test_no_tick_without_the_verdict_on_the_present_one(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("fras_motion.tick_loop.SAY_AGAIN_S", math.inf)
     bench.reset()
     assert [state.tick for state in bench.states] == [0]
     assert bench.reach().accepted
