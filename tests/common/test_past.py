@@ -132,12 +132,13 @@ def test_a_piece_that_is_not_answered_in_time_is_asked_for_again_behind_the_othe
     assert len(found) == sum(min(len(one), kept_of(key)) for (key, _), one in cell.caches.items())
 
 
-def test_who_does_not_tell_the_latest_in_time_is_asked_again():
+@pytest.mark.parametrize("took_s", [TIMEOUT_S * PIECE_SHARE, 0.0], ids=["late", "link too full"])
+def test_who_does_not_tell_the_latest_is_asked_again(took_s: float):
     cell = Cell()
     everyone = cell.caches
     cell.caches = {name: cache for name, cache in everyone.items() if name[0] != LARGE}
     done = asked(cell)
-    cell.now_s += TIMEOUT_S * PIECE_SHARE
+    cell.now_s += took_s
     cell.answer()
     cell.caches = everyone
     while cell.open:
@@ -170,16 +171,3 @@ def test_what_a_full_link_let_drop_is_asked_for_until_nothing_more_comes():
         cell.answer()
     (found,) = done
     assert len(found) == sum(min(len(one), kept_of(key)) for (key, _), one in cell.caches.items())
-
-
-def test_who_was_not_let_through_at_first_is_found():
-    cell = Cell()
-    everyone = cell.caches
-    cell.caches = {name: cache for name, cache in everyone.items() if name[0] != LARGE}
-    done = asked(cell)
-    cell.answer()
-    cell.caches = everyone
-    while cell.open:
-        cell.answer()
-    (found,) = done
-    assert Counter(one.key for one in found) == {LARGE: kept_of(LARGE), SMALL: 703, ONE: 1}

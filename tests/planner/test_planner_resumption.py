@@ -4,10 +4,12 @@ import time
 from collections.abc import Iterator
 from typing import Any
 
+import msgspec
 import pytest
 
 from fras_common.bus import Call, MemoryFabric
 from fras_common.codec import content_digest
+from fras_common.errors import FrasError
 from fras_common.messages import (
     ActionResult,
     ActionState,
@@ -21,7 +23,7 @@ from fras_common.messages import (
     TaskRequest,
     TaskStatus,
 )
-from fras_common.scenario import RunSection, Scenario, resolve
+from fras_common.scenario import GeneratorSection, RunSection, Scenario, resolve
 from fras_common.topics import (
     ACTION_RESULT,
     CANCEL,
@@ -191,3 +193,17 @@ def test_a_service_that_was_away_is_asked_again(theatre: Theatre) -> None:
     theatre.until(lambda: theatre.asked)
     assert theatre.bench.host.waiting_for == ""
     assert theatre.statuses[-1].phase == "resetting"
+
+
+def test_a_start_that_is_refused_leaves_what_is_taken_up_as_it_is(theatre: Theatre) -> None:
+    acting(theatre)
+    theatre.recorder.silent = True
+    theatre.start()
+    wrong = msgspec.structs.replace(
+        SCENARIO, generator=GeneratorSection(disc_radius_min_m=0.04, disc_radius_max_m=0.02)
+    )
+    (refusal,) = theatre.bench.ask(TASK, TaskRequest(command="start", trial="u", scenario=wrong))
+    assert isinstance(refusal, FrasError)
+    theatre.recorder.speak()
+    theatre.until(lambda: theatre.bench.host.gate.trial == "t")
+    assert theatre.statuses[-1].phase == "acting"

@@ -128,7 +128,7 @@ def _own_rules(cell: str, name: str) -> list[Rule]:
     rights = rights_of(name)
     wanted = (
         ("publish", ("put", "reply"), rights.publishes),
-        ("keep", ("put", *_SERVES, "liveliness_token"), [f"{key}/@adv/**" for key in rights.kept]),
+        ("keep", ("put", *_SERVES), [f"{key}/@adv/**" for key in rights.kept]),
         ("serve", _SERVES, rights.serves),
         ("ask", ("query",), rights.asks),
         ("be", ("liveliness_token",), (f"alive/{name}/*", f"ready/{name}/*")),

@@ -75,10 +75,11 @@ class PlannerService:
 
     def _start(self, pending: Deferred[TaskRequest, TaskReply]) -> None:
         request, here = pending.request, self._host.present(f"alive/{PATIENT.service}")
-        scenario = startable(request, self._executive, patient_is_here=here)
+        scenario = check(startable(request, self._executive, patient_is_here=here))
+        # A start that is refused leaves what is being taken up as it is.
         self._restart.give_up()
+        executive, _ = self._enter(request, scenario)
         self._starter = pending
-        executive, _ = self._enter(request, check(scenario))
         self._performer.start(executive.run(), scenario.run.peer_timeout_s)
 
     def _abort(self, pending: Deferred[TaskRequest, TaskReply]) -> None:
