@@ -48,10 +48,6 @@ BEAT_BYTES = 4
 TOKENS = ("alive/**", "ready/**")
 # What a subscriber that begins later, or hears of a publisher later, gets of what was said before.
 EARLIER = {Qos.STATE: Earlier(0, 0), Qos.EVENT: Earlier(1, 1)}
-# What was said before gives way to what is said now, health above all.
-_REPLIES = zenoh.ext.RepliesConfig(
-    congestion_control=zenoh.CongestionControl.DROP, priority=zenoh.Priority.DATA_LOW
-)
 
 
 class ZenohBus:
