@@ -1,24 +1,33 @@
-"""The surgeon's page: `fras bench page [--stops N] [--pairs N] [--opens N] [--json FILE]`.
+"""The surgeon's page: `fras bench page [--stops N] [--pairs N] [--opens N] ...`.
 
 How long after the server's receipt of a click the arms are at rest, at pace 1; what an open page
-costs a tick, as trials in turn with and without a client that takes everything and draws nothing;
+costs a tick, as trials in turn with and without a client that takes everything and draws nothing,
+at pace 1 (from the arms' state to the verdict on it) and as fast as possible (from tick to tick);
 how soon after a page is opened tissue is drawn, by a headless browser without a graphics processor.
 """
 
 import argparse
 import json
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from benchmarks.browser import Fence, chromium
 from benchmarks.machine import processor
-from benchmarks.page_jobs import Floats, measure_first_picture, measure_stops, tick_ms, watched
+from benchmarks.page_jobs import (
+    Floats,
+    loop_ms,
+    measure_first_picture,
+    measure_stops,
+    tick_ms,
+    watched,
+)
 from benchmarks.surgeon import SurgeonsPage, served
 from benchmarks.theatre import Theatre
 
-from fras_cli.stack import own_stack
+from fras_cli.stack import UsedStack, own_stack
 from fras_common.threads import one_thread
 
 
@@ -31,25 +40,47 @@ def spread(values: Floats, digits: int = 1) -> dict[str, float]:
     }
 
 
+def measure_overhead(
+    stack: UsedStack,
+    theatre: Theatre,
+    what: str,
+    measure: Callable[[Theatre, int], Floats],
+    pairs: int,
+) -> dict[str, Any]:
+    """Run scenes without and with a page, whichever first in turn: the machine has its moods."""
+    alone: list[Floats] = []
+    seen: list[Floats] = []
+
+    def with_page(seed: int) -> None:
+        with served(stack.link) as page, watched(page.address):
+            seen.append(measure(theatre, seed))
+
+    for seed in range(1, pairs + 1):
+        if seed % 2 == 0:
+            with_page(seed)
+        alone.append(measure(theatre, seed))
+        if seed % 2 == 1:
+            with_page(seed)
+        print(f"pair {seed} of {pairs}", flush=True)
+    one, other = np.concatenate(alone), np.concatenate(seen)
+    return {
+        f"{what}_alone_ms": spread(one, 2),
+        f"{what}_with_page_ms": spread(other, 2),
+        f"{what}_ratio_of_medians": round(float(np.median(other) / np.median(one)), 3),
+    }
+
+
 def measure_page(
-    folder: Path, stops: int, pairs: int, opens: int, *, scene: bool
+    folder: Path, *, stops: int, pairs: int, paced_pairs: int, opens: int, scene: bool
 ) -> dict[str, Any]:
     figures: dict[str, Any] = {"processor": processor(), "stops": stops, "pairs": pairs}
     fence = Fence()
     with own_stack("bench-page", None, folder / "logs") as stack:
         theatre = Theatre(stack, folder)
-        alone: list[Floats] = []
-        seen: list[Floats] = []
-        for seed in range(1, pairs + 1):
-            alone.append(tick_ms(theatre, seed))
-            with served(stack.link) as page, watched(page.address):
-                seen.append(tick_ms(theatre, seed))
-            print(f"pair {seed} of {pairs}", flush=True)
         if pairs:
-            figures["tick_alone_ms"] = spread(np.concatenate(alone), 2)
-            figures["tick_with_page_ms"] = spread(np.concatenate(seen), 2)
-            ratios = [np.median(b) / np.median(a) for a, b in zip(alone, seen, strict=True)]
-            figures["ratio_of_medians"] = round(float(np.median(ratios)), 3)
+            figures |= measure_overhead(stack, theatre, "tick", tick_ms, pairs)
+        if paced_pairs:
+            figures |= measure_overhead(stack, theatre, "loop", loop_ms, paced_pairs)
         with served(stack.link) as page, chromium(fence) as browser:
             if opens:
                 tick_ms(theatre, 1)  # so that there is tissue to draw
@@ -73,14 +104,22 @@ def main() -> None:
     one_thread()
     parser = argparse.ArgumentParser(prog="fras bench page", description=__doc__)
     parser.add_argument("--stops", type=int, default=200)
-    parser.add_argument("--pairs", type=int, default=6, help="trials without and with a page")
+    parser.add_argument(
+        "--pairs", type=int, default=20, help="trials as fast as possible without and with a page"
+    )
+    parser.add_argument("--paced-pairs", type=int, default=6, help="the same at pace 1")
     parser.add_argument("--opens", type=int, default=10)
     parser.add_argument("--scene", action="store_true", help="draw the scene during the stops, too")
     parser.add_argument("--json", type=Path, help="also write the figures there")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         figures = measure_page(
-            Path(name), options.stops, options.pairs, options.opens, scene=options.scene
+            Path(name),
+            stops=options.stops,
+            pairs=options.pairs,
+            paced_pairs=options.paced_pairs,
+            opens=options.opens,
+            scene=options.scene,
         )
     width = max(map(len, figures))
     for what, value in figures.items():

@@ -164,6 +164,21 @@ def tick_ms(theatre: Theatre, seed: int) -> Floats:
     return durations_ms(theatre.folder / "audit.mcap")
 
 
+def loop_ms(theatre: Theatre, seed: int) -> Floats:
+    """Run a scene at the pace of life; each tick, from the arms' state to the verdict [ms]."""
+    theatre.start(1.0, mesh=MESH, seed=seed)
+    theatre.until_ended()
+    trial = read_trial(theatre.folder / "audit.mcap")
+    judged = {one.tick: one.stamp_ns for one in trial.verdicts}
+    return np.array(
+        [
+            (judged[one.tick] - one.stamp_ns) / 1e6
+            for one in trial.robot
+            if one.goal_id and one.tick in judged
+        ]
+    )
+
+
 def durations_ms(log: Path) -> Floats:
     """Return the time between two robot states of the same action [ms]."""
     robot = read_trial(log).robot

@@ -3,8 +3,8 @@
 import pytest
 
 from fras_monitor.liveness import DEAD_S, LATE_S, freshness, life_of
+from fras_monitor.pace import FRAME_S
 from fras_monitor.picture import Picture, apply, with_token
-from fras_monitor.service import FRAME_S
 from support import pictures as p
 
 SHOWN_S = 1.5

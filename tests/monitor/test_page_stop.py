@@ -8,7 +8,7 @@ import pytest
 from fras_common.bus import Call, MemoryBus, MemoryFabric
 from fras_common.errors import FrasError
 from fras_common.messages import HoldRequest, HoldState
-from fras_common.topics import HOLD
+from fras_common.topics import HOLD, ROBOT_STATE
 from fras_monitor.stop import HOLDER, Stopper, StopRecord
 from support import pictures as p
 
@@ -99,8 +99,25 @@ def test_a_press_holds_the_arms_by_the_pages_name(fabric: MemoryFabric, pressed:
     pressed.stopper.press()
     assert pressed.until("acknowledged").attempts == 1
     assert [one.holder for one in motion.asked] == [HOLDER]
-    pressed.stopper.see(p.robot(phase="held", holds=HELD))
-    assert pressed.stopper.record.state == "at_rest"
+    robot = motion.bus.publisher(ROBOT_STATE)
+    robot.put(p.robot(phase="lift", holds=HELD))
+    robot.put(p.robot(phase="held", holds=HELD))
+    record = pressed.until("at_rest")
+    assert record.at_rest_s is not None
+    assert record.acknowledged_s is not None
+    assert record.at_rest_s >= record.acknowledged_s
+
+
+def test_arms_that_stand_are_seen_though_every_answer_is_lost(
+    fabric: MemoryFabric, pressed: Pressed
+):
+    motion = Motion(fabric)
+    motion.refuse = 10
+    motion.serve()
+    motion.bus.publisher(ROBOT_STATE).put(p.robot(phase="held", holds=HELD))
+    pressed.stopper.press()
+    pressed.until("at_rest")
+    assert pressed.stopper.record.attempts < motion.refuse
 
 
 def test_motion_is_asked_again_until_it_says_yes(fabric: MemoryFabric, pressed: Pressed):

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from fras_common import messages as m
+from fras_common.bus import Recent
 from fras_common.codec import MalformedMessage, decode
 from fras_common.errors import FrasError
 from fras_common.service import ServiceHost
@@ -29,11 +30,13 @@ from fras_monitor.mail import Mail
 from fras_monitor.picture import Picture, apply, remembered, with_token
 
 ANSWER_S: Final = 2.0
+VERDICTS: Final = 100
+"""Each is a point of a plot: as many as may come between two pictures."""
 
 # Of these only the latest counts; of the others each does.
 LATEST: Final[tuple[Topic[Any], ...]] = (TISSUE_MODEL, CONTEXT, RECORDER_STATUS)
 EACH: Final[tuple[Topic[Any], ...]] = (
-    VERDICT, PLAN, TASK_STATUS, ACTION_RESULT, HOLDS, SUPERVISOR_STATUS,
+    PLAN, TASK_STATUS, ACTION_RESULT, HOLDS, SUPERVISOR_STATUS,
 )  # fmt: skip
 # Not latched: who opens the page between two actions would see nothing of them.
 MISSED: Final[tuple[Topic[Any], ...]] = (TISSUE_STATE, ROBOT_STATE, VERDICT, CONTEXT)
@@ -56,13 +59,10 @@ class Listener:
     Parameters
     ----------
     host : ServiceHost
-    on_robot : callable
-        Told each state of the arms on the bus's own thread, as soon as it arrives.
     """
 
-    def __init__(self, host: ServiceHost, on_robot: Callable[[m.RobotState], None]) -> None:
+    def __init__(self, host: ServiceHost) -> None:
         self._host = host
-        self._on_robot = on_robot
         self._mail = Mail()
         self.picture = Picture()
         bus = host.bus
@@ -71,10 +71,13 @@ class Listener:
             bus.subscribe(topic, self._keep_latest(topic.key))
         for topic in EACH:
             bus.subscribe(topic, self.note)
-        # Large, and many more than are drawn: looked at as often as anything is drawn.
-        self._tissue = bus.latest(TISSUE_STATE)
+        # Said each tick, which may be far more often than anything is drawn: looked at before that.
+        self._each_tick: tuple[Recent[m.Header], ...] = (
+            bus.recent(TISSUE_STATE, 1),
+            bus.recent(ROBOT_STATE, 1),
+            bus.recent(VERDICT, VERDICTS),
+        )
         bus.subscribe(HEALTH, self._on_health)
-        bus.subscribe(ROBOT_STATE, self._on_robot_state)
         bus.watch_tokens(lambda name, present: self.note(_Token(name, present)))
         for topic in MISSED:
             request = m.LastRequest(key=topic.key)
@@ -86,8 +89,10 @@ class Listener:
 
     def look(self) -> Picture:
         """Take in what has arrived, and return all that is known."""
-        if (tissue := self._tissue.take()) is not None:
-            self._mail.replace(TISSUE_STATE.key, tissue, time.monotonic())
+        now_s = time.monotonic()
+        for recent in self._each_tick:
+            for message in recent.take():
+                self._mail.append(message, now_s)
         for message, at_s in self._mail.take():
             self.picture = _with(self.picture, message, at_s)
         self._host.counts["received"] = self._mail.received
@@ -99,10 +104,6 @@ class Listener:
 
     def _on_health(self, health: m.Health) -> None:
         self._mail.replace(("health", health.service), health, time.monotonic())
-
-    def _on_robot_state(self, robot: m.RobotState) -> None:
-        self._on_robot(robot)
-        self._mail.replace(ROBOT_STATE.key, robot, time.monotonic())
 
     def _take_last(self, topic: Topic[Any]) -> Callable[[m.LastReply | FrasError], None]:
         def on_done(answer: m.LastReply | FrasError) -> None:

@@ -6,6 +6,11 @@ import threading
 from typing import Final
 
 NICENESS: Final = 10
+FRAME_S: Final = 0.05
+FAST: Final = 1.5
+"""Simulated seconds in one of ours from which on a trial counts as run faster than life."""
+SHARE: Final = 0.04
+"""Of one processor: what drawing such a trial may take."""
 
 
 def give_way() -> None:
@@ -35,3 +40,39 @@ class Due:
     def wait_s(self, now_s: float) -> float:
         """Seconds until it is due."""
         return max(0.0, self._next_s - now_s)
+
+
+class Frames:
+    """When the next picture is due: 20 a second, fewer of a trial that runs faster than life.
+
+    Notes
+    -----
+    Such a trial is waited for rather than followed, and takes all that the machine has: there
+    drawing keeps to its share, and ticks come first. At the pace of life processors idle between
+    two ticks, and each picture is drawn.
+    """
+
+    def __init__(self) -> None:
+        self._next_s = self._drawn_s = 0.0
+        self._simulated_s = 0.0
+
+    def wait_s(self, now_s: float) -> float:
+        """Seconds until it is due."""
+        return max(0.0, self._next_s - now_s)
+
+    def drawn(self, now_s: float, took_s: float, simulated_s: float) -> None:
+        """Note a picture.
+
+        Parameters
+        ----------
+        now_s : float
+            When it was begun.
+        took_s : float
+            Processor time that it took.
+        simulated_s : float
+            Up to where the trial had come.
+        """
+        since_s, went_s = now_s - self._drawn_s, simulated_s - self._simulated_s
+        period_s = max(FRAME_S, took_s / SHARE) if went_s > FAST * since_s else FRAME_S
+        self._drawn_s, self._simulated_s = now_s, simulated_s
+        self._next_s = now_s + period_s

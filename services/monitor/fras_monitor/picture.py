@@ -106,6 +106,12 @@ class Picture:
         model = self.of_trial(self.model)
         return model.dt_s if model is not None else 0.0
 
+    @property
+    def simulated_s(self) -> float:
+        """Up to where the arms have come in the trial."""
+        robot = self.of_trial(self.robot)
+        return robot.tick * self.dt_s if robot is not None else 0.0
+
     def of_trial(self, heard: "Heard[H] | None") -> "H | None":
         """Return a message if it belongs to the current trial."""
         belongs = heard is not None and heard.message.trial == self.trial
@@ -159,9 +165,10 @@ def apply(picture: Picture, message: object, now_s: float) -> Picture:
         case ReplayStatus():
             return replace(picture, replay=Heard(_with_marks(picture.replay, message), now_s))
         case _ if (name := _LATEST.get(type(message))) is not None:
+            news: dict[str, Any] = {name: Heard(message, now_s)}
             if isinstance(message, Verdict):
-                picture = replace(picture, trace=picture.trace.extended(message))
-            return replace(picture, **{name: Heard(message, now_s)})
+                news["trace"] = picture.trace.extended(message)
+            return replace(picture, **news)
         case _:
             raise TypeError(f"no key of this page carries a {type(message).__name__}")
 

@@ -14,7 +14,7 @@ from fras_monitor.audience import Audience
 from fras_monitor.commands import AnyCommand, Colouring, Look, Stop
 from fras_monitor.desk import Desk
 from fras_monitor.listening import Listener
-from fras_monitor.pace import Due, give_way
+from fras_monitor.pace import Due, Frames, give_way
 from fras_monitor.page.door import Door
 from fras_monitor.page.hub import Hub
 from fras_monitor.page.scene import Scene
@@ -23,7 +23,6 @@ from fras_monitor.replay_watch import ReplayWatch
 from fras_monitor.stop import Stopper
 from fras_monitor.view import course_of, holds_of, view_of
 
-FRAME_S: Final = 0.05
 VIEW_S: Final = 0.1
 COURSE_S: Final = 0.25
 BEATS_A_SECOND: Final = 4
@@ -56,7 +55,7 @@ class MonitorService:
     ) -> None:
         require_closed(bind, policy)
         self._host = host
-        self._frame, self._view, self._course = Due(FRAME_S), Due(VIEW_S), Due(COURSE_S)
+        self._frames, self._view, self._course = Frames(), Due(VIEW_S), Due(COURSE_S)
         # No supervisor keeps the page, and so none says which process it is.
         host.facts["pid"] = str(os.getpid())
         self._audience = Audience(host)
@@ -65,7 +64,7 @@ class MonitorService:
         door = Door(bind, port, policy, self._hub.attend)
         self._server = door.open()
         self._scene = Scene(self._server, self._on_block)
-        self._listener = Listener(host, self.stopper.see)
+        self._listener = Listener(host)
         self._replay = ReplayWatch(host, self._listener)
         self._desk = Desk(
             host.bus,
@@ -98,9 +97,9 @@ class MonitorService:
 
     def wake(self) -> float | None:
         """Draw what is due; return the seconds until the next time."""
-        now_s = time.monotonic()
-        if not self._frame.take(now_s):
-            return self._frame.wait_s(now_s)
+        now_s, began_s = time.monotonic(), time.thread_time()
+        if (wait_s := self._frames.wait_s(now_s)) > 0.0:
+            return wait_s
         picture = self._listener.look()
         self._host.tick = picture.robot.message.tick if picture.robot is not None else -1
         if picture.holds is not None:
@@ -109,7 +108,8 @@ class MonitorService:
         if self._view.take(now_s):
             self._show(picture, now_s)
         self._scene.draw(picture)
-        return self._frame.wait_s(time.monotonic())
+        self._frames.drawn(now_s, time.thread_time() - began_s, picture.simulated_s)
+        return self._frames.wait_s(time.monotonic())
 
     def _show(self, picture: Picture, now_s: float) -> None:
         view = msgspec.to_builtins(view_of(picture, self.stopper.record, now_s))

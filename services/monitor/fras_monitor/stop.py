@@ -10,12 +10,14 @@ from typing import Final, Literal
 from fras_common.bus import Bus
 from fras_common.errors import FrasError
 from fras_common.messages import HoldRequest, HoldState, RobotState
-from fras_common.topics import HOLD
+from fras_common.topics import HOLD, ROBOT_STATE
 
 HOLDER: Final = "monitor"
 REASON: Final = "stop pressed on the surgeon's page"
 ANSWER_S: Final = 0.5
 """How long one question may take before it is asked again."""
+LOOK_S: Final = 0.002
+"""How often the arms are looked at while they come to rest."""
 
 StopState = Literal["none", "sent", "acknowledged", "at_rest"]
 # Phases in which an action's arm stands still.
@@ -101,6 +103,7 @@ class Stopper:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._bus = bus
+        self._robot = bus.recent(ROBOT_STATE, 1)
         self._on_change = on_change
         self._clock = clock
         self._lock = threading.Lock()
@@ -119,11 +122,6 @@ class Stopper:
         """Stop the arms; returns at once. Pressed again, motion is asked again."""
         self._change(lambda _: StopRecord(pressed_s=self._clock(), state="sent"))
         self._presses.put(True)
-
-    def see(self, robot: RobotState) -> None:
-        """Take in a state of the arms; called on the bus's own thread, as soon as it arrives."""
-        if self.record.state in ("sent", "acknowledged"):
-            self._change(lambda record: record.seen(robot, self._clock()))
 
     def see_holds(self, holds: Mapping[str, str], at_s: float) -> None:
         """Forget the last press if somebody else has lifted it, at a terminal say.
@@ -152,6 +150,9 @@ class Stopper:
         while self._presses.get():
             while self.record.state == "sent" and self._presses.empty():
                 self._ask()
+            while self.record.state == "acknowledged" and self._presses.empty():
+                self._look()
+                self._pause(LOOK_S)
 
     def _ask(self) -> None:
         """Ask once; an answer is waited for as long as the next attempt is not due."""
@@ -163,17 +164,25 @@ class Stopper:
             answer = answers.get(timeout=2.0 * ANSWER_S)
         except queue.Empty:
             self._change(lambda record: record.failed("the system's network does not answer"))
+            self._look()
             return
         except FrasError as error:
             answer = error
         if isinstance(answer, FrasError):
             problem = str(answer)
             self._change(lambda record: record.failed(problem))
+            # An answer may be lost, and yet the arms stand.
+            self._look()
             # A router that is away refuses at once: asked again, but not as fast as one can.
             self._pause(ANSWER_S - (self._clock() - began_s))
         else:
             now_s = self._clock()
             self._change(lambda record: record.acknowledged(now_s))
+
+    def _look(self) -> None:
+        """See how the arms are."""
+        for robot in self._robot.take():
+            self._change(lambda record, robot=robot: record.seen(robot, self._clock()))
 
     def _pause(self, rest_s: float) -> None:
         """Wait, unless somebody presses again or the page ends."""

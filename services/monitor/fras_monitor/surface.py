@@ -1,6 +1,7 @@
 """The tissue's faces sorted into bands of one colour each: a mesh of the viewer has one colour."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -53,18 +54,24 @@ def share_of(
     match by:
         case "force":
             # Along the root, as `force_rgb` does: few nodes bear much.
-            return np.sqrt(np.clip(np.nan_to_num(force_n) / top_n, 0.0, 1.0))
+            return np.sqrt(_within(force_n / top_n))
         case "lift":
             moved_m = np.linalg.norm(nodes_m - rest_m, axis=1)
-            return np.clip(np.nan_to_num(moved_m) / LIFT_TOP_M, 0.0, 1.0)
+            return _within(moved_m / LIFT_TOP_M)
         case "plain":
             return np.zeros(len(nodes_m))
 
 
-def band_colours(by: Colouring) -> list[Rgb]:
+def _within(share: FloatArray) -> FloatArray:
+    """Bring a share to 0 to 1; what is no number is none."""
+    return np.minimum(np.fmax(share, 0.0), 1.0)
+
+
+@lru_cache
+def band_colours(by: Colouring) -> tuple[Rgb, ...]:
     """Return the colour of each band, from the scale's start to its end."""
     if by == "plain":
-        return [PLAIN] * BANDS
+        return (PLAIN,) * BANDS
     middles = (np.arange(BANDS) + 0.5) / BANDS
     if by == "force":
         rows = force_rgb(middles**2, 1.0)
@@ -72,7 +79,7 @@ def band_colours(by: Colouring) -> list[Rgb]:
         stops = np.array([rgb(one) for one in LIFT_STOPS], dtype=np.float64)
         places = np.linspace(0.0, 1.0, len(stops))
         rows = np.stack([np.interp(middles, places, stops[:, i]) for i in range(3)], axis=-1)
-    return [(int(red), int(green), int(blue)) for red, green, blue in np.rint(rows).tolist()]
+    return tuple((int(red), int(green), int(blue)) for red, green, blue in np.rint(rows).tolist())
 
 
 def bands(nodes_m: FloatArray, surface: IndexArray, share: FloatArray, by: Colouring) -> list[Band]:

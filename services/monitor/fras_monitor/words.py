@@ -2,7 +2,11 @@
 
 import re
 from collections.abc import Callable, Mapping
+from functools import lru_cache
 from typing import Final
+
+# The same few texts stand on the page for seconds, and are told anew ten times a second.
+TOLD: Final = 2_000
 
 ARMS: Final = {"psm1": "right instrument", "psm2": "left instrument"}
 
@@ -126,6 +130,7 @@ def service_in_words(name: str) -> str:
     return ", ".join(SERVICES.get(one, one) for one in names)
 
 
+@lru_cache(TOLD)
 def action_in_words(text: str, *, under_way: bool = False) -> str:
     """Tell an action, `pull(psm1,b(3,4))`, as something to do or something that is being done."""
     found = _ACTION.fullmatch(text)
@@ -143,6 +148,7 @@ def phase_in_words(phase: str, action: str) -> str:
     return _PHASES.get(phase, phase)
 
 
+@lru_cache(TOLD)
 def fluent_in_words(atom: str) -> str:
     """Tell an atom of the situation; a leading minus says that it does not hold."""
     negated = atom.startswith("-")
@@ -154,6 +160,7 @@ def fluent_in_words(atom: str) -> str:
     return atom
 
 
+@lru_cache(TOLD)
 def evidence_in_words(name: str, value: float) -> str:
     """Tell a number behind an atom with its unit, as its name says: `distance_m` in mm."""
     for ending, (unit, factor) in _EVIDENCE.items():
@@ -195,6 +202,7 @@ def hold_in_words(holder: str, reason: str = "") -> str:
     return f"{told} ({plain(why)})" if why else told
 
 
+@lru_cache(TOLD)
 def plain(text: str) -> str:
     """Put everything in a sentence that is shorthand into words."""
     text = _ACTION.sub(lambda found: _quoted_action(found[0]), text)

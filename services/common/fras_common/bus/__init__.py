@@ -4,11 +4,11 @@ from fras_common.bus.contract import (
     Bus,
     BusClosed,
     Call,
-    Latest,
     NoAnswer,
     Publisher,
     RawPublisher,
     RawSample,
+    Recent,
     RemoteFault,
 )
 from fras_common.bus.memory_bus import MemoryBus, MemoryFabric
@@ -17,12 +17,12 @@ __all__ = [
     "Bus",
     "BusClosed",
     "Call",
-    "Latest",
     "MemoryBus",
     "MemoryFabric",
     "NoAnswer",
     "Publisher",
     "RawPublisher",
     "RawSample",
+    "Recent",
     "RemoteFault",
 ]

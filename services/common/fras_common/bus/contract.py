@@ -10,7 +10,7 @@
 - A publisher may be used from several threads: samples travel in the order of their `seq`.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
@@ -82,11 +82,11 @@ class RawPublisher(Protocol):
         ...
 
 
-class Latest(Protocol[M_co]):
-    """What was said last under a key; costs nothing until it is looked at."""
+class Recent(Protocol[M_co]):
+    """What was said last under a key; wakes nobody until it is looked at."""
 
-    def take(self) -> M_co | None:
-        """Return the latest message since the last look; None if there is none."""
+    def take(self) -> Sequence[M_co]:
+        """Return the messages since the last look, oldest first."""
         ...
 
 
@@ -125,8 +125,11 @@ class Bus(Protocol):
         """Receive every message of a key or family; latched topics deliver their last value."""
         ...
 
-    def latest(self, topic: Topic[M]) -> Latest[M]:
-        """Look at a concrete key now and then; what is lost on the way is not asked for."""
+    def recent(self, topic: Topic[M], at_most: int) -> Recent[M]:
+        """Look now and then at what came on a concrete key, of more than `at_most` at the last.
+
+        What is lost on the way is not asked for.
+        """
         ...
 
     def subscribe_raw(self, key_expr: str, callback: Callable[[RawSample], None]) -> None:

@@ -2,16 +2,18 @@
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 from fras_common.bus.contract import RawSample
-from fras_common.bus.past import Cached, Get, latest_selector
+from fras_common.bus.past import Beat, Cached, Get, latest_selector
 from fras_common.bus.recovery import Ask, Earlier, Recovery
 
 __all__ = ["Asker", "Hearing"]
 
 ANSWER_S = 10.0
 """A publisher that is busy answers late."""
+BEATS_S = 0.1
+"""How often what publishers repeat of their numbers is looked at: each time they may have."""
 
 
 class Asker:
@@ -46,17 +48,21 @@ class Asker:
             self._thread.join()
 
     def _run(self) -> None:
+        beats_s = 0.0
         while True:
             with self._changed:
                 if self._is_closed:
                     return
                 self._is_changed = False
                 hearings = self._hearings
+            if time.monotonic() >= beats_s:
+                for one in hearings:
+                    one.take_beats()
+                beats_s = time.monotonic() + BEATS_S
             dues_s = [due_s for one in hearings if (due_s := one.ask()) is not None]
             with self._changed:
                 if not self._is_changed and not self._is_closed:
-                    wait_s = max(0.0, min(dues_s) - time.monotonic()) if dues_s else None
-                    self._changed.wait(wait_s)
+                    self._changed.wait(max(0.0, min([*dues_s, beats_s]) - time.monotonic()))
 
 
 class Hearing:
@@ -67,6 +73,8 @@ class Hearing:
     asker : Asker
     get : callable
         Asks a cache; may call back on any thread.
+    beats : callable
+        Gives what publishers have repeated of their numbers since the last time.
     callback : callable
         Gets the samples, one at a time, on any thread.
     earlier : Earlier
@@ -74,10 +82,16 @@ class Hearing:
     """
 
     def __init__(
-        self, asker: Asker, get: Get, callback: Callable[[RawSample], None], earlier: Earlier
+        self,
+        asker: Asker,
+        get: Get,
+        beats: Callable[[], Iterable[Beat]],
+        callback: Callable[[RawSample], None],
+        earlier: Earlier,
     ) -> None:
         self._asker = asker
         self._get = get
+        self._beats = beats
         self._callback = callback
         self._earlier = earlier
         self._recovery = Recovery(time.monotonic, earlier)
@@ -99,11 +113,12 @@ class Hearing:
             self._recovery.told.append(sample)
         self._tell()
 
-    def note_latest(self, key: str, publisher: str, number: int) -> None:
-        """Take in which number was a publisher's latest."""
+    def take_beats(self) -> None:
+        """Take in which numbers were the publishers' latest."""
         with self._lock:
-            self._recovery.note_latest(key, publisher, number)
-            self._look()
+            for beat in self._beats():
+                self._recovery.note_latest(beat.key, beat.publisher, beat.number)
+            self._due_s = self._recovery.due_s()
 
     def ask_latest(self, key_expr: str) -> None:
         """Ask who is there for what is to be told of before, sooner than their next heartbeat."""

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 from fras_common.bus.contract import BusClosed, Call, OnMalformed, RawSample, RemoteFault
-from fras_common.bus.shared import Answer, Newest, Stamper, received, wait_for
+from fras_common.bus.shared import Answer, Kept, Stamper, received, wait_for
 from fras_common.codec import MalformedMessage, decode, encode
 from fras_common.errors import FrasError
 from fras_common.keeping import kept_of
@@ -110,11 +110,11 @@ class MemoryBus:
 
         self._subscribe(topic.wildcard, deliver, history=1 if topic.qos is Qos.EVENT else 0)
 
-    def latest(self, topic: Topic[M]) -> Newest[M]:
-        """Look at a concrete key now and then."""
-        kept = deque[RawSample](maxlen=1)
+    def recent(self, topic: Topic[M], at_most: int) -> Kept[M]:
+        """Look now and then at what came on a concrete key."""
+        kept = deque[RawSample](maxlen=at_most)
         self._subscribe(topic.key, kept.append, history=0)
-        return Newest(topic, lambda: kept.pop() if kept else None, self._on_malformed)
+        return Kept(topic, lambda: [kept.popleft() for _ in range(len(kept))], self._on_malformed)
 
     def subscribe_raw(self, key_expr: str, callback: Callable[[RawSample], None]) -> None:
         """Receive samples undecoded, from now on."""

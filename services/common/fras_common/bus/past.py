@@ -16,7 +16,16 @@ from typing import Final
 from fras_common.bus.contract import RawSample
 from fras_common.keeping import kept_of
 
-__all__ = ["CACHES", "Cached", "Get", "Past", "cache_selector", "latest_selector", "piece_length"]
+__all__ = [
+    "CACHES",
+    "Beat",
+    "Cached",
+    "Get",
+    "Past",
+    "cache_selector",
+    "latest_selector",
+    "piece_length",
+]
 
 CACHES: Final = "/@adv/pub/"
 """Between the key and `<session>/<entity>` of an advanced publisher: where it answers for its
@@ -46,6 +55,15 @@ class Cached:
     """
 
     sample: RawSample
+    publisher: str
+    number: int
+
+
+@dataclass(frozen=True)
+class Beat:
+    """A publisher's word on the number of its latest sample."""
+
+    key: str
     publisher: str
     number: int
 

@@ -55,34 +55,34 @@ def received(topic: Topic[M], payload: bytes, key: str) -> M:
     return message
 
 
-class Newest(Generic[M]):
-    """Decodes what came last on a key, once it is looked at.
+class Kept(Generic[M]):
+    """Decodes what came on a key, once it is looked at.
 
     Parameters
     ----------
     topic : Topic
-    fetch : callable
-        Gives the newest sample since the last time, or None.
+    take : callable
+        Gives the samples since the last time, oldest first.
     on_malformed : callable
         Gets a payload that did not fit.
     """
 
     def __init__(
-        self, topic: Topic[M], fetch: Callable[[], RawSample | None], on_malformed: OnMalformed
+        self, topic: Topic[M], take: Callable[[], list[RawSample]], on_malformed: OnMalformed
     ) -> None:
         self._topic = topic
-        self._fetch = fetch
+        self._take = take
         self._on_malformed = on_malformed
 
-    def take(self) -> M | None:
-        """Return the latest message since the last look; None if there is none."""
-        if (sample := self._fetch()) is None:
-            return None
-        try:
-            return received(self._topic, sample.payload, sample.key)
-        except MalformedMessage as error:
-            self._on_malformed(error)
-            return None
+    def take(self) -> list[M]:
+        """Return the messages since the last look, oldest first."""
+        taken: list[M] = []
+        for sample in self._take():
+            try:
+                taken.append(received(self._topic, sample.payload, sample.key))
+            except MalformedMessage as error:
+                self._on_malformed(error)
+        return taken
 
 
 class Answer(Generic[T]):

@@ -12,7 +12,7 @@ while it replies: who asks a cache lets it drop, and asks again.
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, Generic, TypeVar, cast
 
 import zenoh
@@ -26,11 +26,11 @@ from fras_common.bus.contract import (
     RawSample,
 )
 from fras_common.bus.hearing import Asker, Hearing
-from fras_common.bus.past import CACHES, Cached, Past
+from fras_common.bus.past import CACHES, Beat, Cached, Past
 from fras_common.bus.recovery import ALL_OF_WHO_BEGINS, Earlier
 from fras_common.bus.settings import NoRouter, client_settings
-from fras_common.bus.shared import Answer, Newest, Stamper, received, wait_for
-from fras_common.bus.zenoh_wire import ENCODING, ZenohCall, configured, numbered, outcome, raw
+from fras_common.bus.shared import Answer, Kept, Stamper, received, wait_for
+from fras_common.bus.zenoh_wire import ENCODING, ZenohCall, beat, configured, numbered, outcome, raw
 from fras_common.codec import MalformedMessage, decode, encode
 from fras_common.errors import FrasError
 from fras_common.identity import Identity, require_tls
@@ -43,8 +43,8 @@ Req = TypeVar("Req")
 Rep = TypeVar("Rep")
 
 HEARTBEAT_S = 0.1
-# A publisher's latest number, as four bytes.
-BEAT_BYTES = 4
+# Numbers that may wait until they are looked at; whoever repeats one does so again.
+BEATS = 1024
 TOKENS = ("alive/**", "ready/**")
 # What a subscriber that begins later, or hears of a publisher later, gets of what was said before.
 EARLIER = {Qos.STATE: Earlier(0, 0), Qos.EVENT: Earlier(1, 1)}
@@ -170,19 +170,26 @@ class ZenohBus:
             self._session.declare_subscriber(topic.wildcard, lambda sample: deliver(raw(sample)))
         )
 
-    def latest(self, topic: Topic[M]) -> Newest[M]:
-        """Look at a concrete key now and then; Zenoh keeps one, and wakes nobody."""
+    def recent(self, topic: Topic[M], at_most: int) -> Kept[M]:
+        """Look now and then at what came on a concrete key."""
         self.require_open()
-        ring = cast(Any, zenoh.handlers.RingChannel(1))
-        declared: Any = self._session.declare_subscriber(topic.key, ring)
+        ring = self._ring(topic.key, at_most)
+        return Kept(topic, lambda: [raw(one) for one in ring()], self._on_malformed)
+
+    def _ring(self, key_expr: str, at_most: int) -> Callable[[], Iterator[zenoh.Sample]]:
+        """Have Zenoh keep what comes, without a word to us: to be taken, oldest first."""
+        kept = cast(Any, zenoh.handlers.RingChannel(at_most))
+        declared: Any = self._session.declare_subscriber(key_expr, kept)
         self._declared.append(declared)
 
-        def fetch() -> RawSample | None:
-            if self._closed or (sample := declared.try_recv()) is None:
-                return None
-            return raw(sample)
+        def take() -> Iterator[zenoh.Sample]:
+            # Somebody else may say more as fast as it is taken.
+            for _ in range(at_most):
+                if self._closed or (sample := declared.try_recv()) is None:
+                    return
+                yield sample
 
-        return Newest(topic, fetch, self._on_malformed)
+        return take
 
     def subscribe_raw(self, key_expr: str, callback: Callable[[RawSample], None]) -> None:
         """Receive samples undecoded, from now on."""
@@ -190,7 +197,12 @@ class ZenohBus:
 
     def _hear(self, key_expr: str, callback: Callable[[RawSample], None], earlier: Earlier) -> None:
         self.require_open()
-        hearing = Hearing(self._asker, self._get_cached, callback, earlier)
+        beats = self._ring(f"{key_expr}{CACHES}**", BEATS)
+
+        def take_beats() -> Iterator[Beat]:
+            return (found for one in beats() if (found := beat(one)) is not None)
+
+        hearing = Hearing(self._asker, self._get_cached, take_beats, callback, earlier)
 
         def note(sample: zenoh.Sample) -> None:
             if (heard := numbered(sample)) is not None:
@@ -198,16 +210,7 @@ class ZenohBus:
             else:
                 hearing.pass_on(raw(sample))
 
-        def note_latest(beat: zenoh.Sample) -> None:
-            payload = beat.payload.to_bytes()
-            key, _, name = str(beat.key_expr).partition(CACHES)
-            # Anybody may say something else there; it tells nothing.
-            if len(payload) == BEAT_BYTES:
-                publisher = "/".join(name.split("/")[:2])
-                hearing.note_latest(key, publisher, int.from_bytes(payload, "little"))
-
-        for key, tell in ((key_expr, note), (f"{key_expr}{CACHES}**", note_latest)):
-            self._declared.append(self._session.declare_subscriber(key, tell))
+        self._declared.append(self._session.declare_subscriber(key_expr, note))
         hearing.ask_latest(key_expr)
 
     def cached(
@@ -340,10 +343,10 @@ class ZenohBus:
         if self._closed:
             return
         self._closed = True
+        self._asker.close()
         for declared in reversed(self._declared):
             declared.undeclare()
         self._declared.clear()
-        self._asker.close()
         self._session.close()
 
     def require_open(self) -> None:

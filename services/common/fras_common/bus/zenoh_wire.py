@@ -10,18 +10,20 @@ from typing import Any, TypeVar
 import zenoh
 
 from fras_common.bus.contract import NoAnswer, RawSample, RemoteFault
-from fras_common.bus.past import Cached
+from fras_common.bus.past import CACHES, Beat, Cached
 from fras_common.bus.settings import Settings
 from fras_common.codec import MalformedMessage, decode, encode
 from fras_common.errors import FrasError
 from fras_common.messages import Fault
 from fras_common.topics import Query
 
-__all__ = ["ENCODING", "ZenohCall", "configured", "numbered", "outcome", "raw"]
+__all__ = ["ENCODING", "ZenohCall", "beat", "configured", "numbered", "outcome", "raw"]
 
 Rep = TypeVar("Rep")
 
 ENCODING = zenoh.Encoding("application/msgpack")
+# A publisher's latest number, as four bytes.
+BEAT_BYTES = 4
 
 
 class ZenohCall:
@@ -53,6 +55,15 @@ def numbered(sample: zenoh.Sample) -> Cached | None:
     if (info := sample.source_info) is None:
         return None
     return Cached(raw(sample), f"{info.source_id.zid}/{info.source_id.eid}", info.source_sn)
+
+
+def beat(sample: zenoh.Sample) -> Beat | None:
+    """Take a publisher's latest number; anybody may say something else there, which tells none."""
+    payload = sample.payload.to_bytes()
+    key, _, name = str(sample.key_expr).partition(CACHES)
+    if len(payload) != BEAT_BYTES:
+        return None
+    return Beat(key, "/".join(name.split("/")[:2]), int.from_bytes(payload, "little"))
 
 
 def outcome(query: Query[Any, Rep], reply: zenoh.Reply, timeout_s: float) -> Rep | FrasError:

@@ -63,6 +63,8 @@ VERTICES: Final = np.zeros((0, 3), dtype=np.float32)
 class Scene:
     """Draws pictures; everyone who looks sees the same scene, each from where they like.
 
+    What is told to viser and has not changed is sent to nobody.
+
     Parameters
     ----------
     server : viser.ViserServer
@@ -187,8 +189,9 @@ class Scene:
             is_better = context.tick == tissue.tick
             if self._blocks is None or (is_better and not self._blocks.exact):
                 self._blocks = blocks_of(context, ground, tissue)
-            self._draw_blocks(self._blocks, kinds, nodes_m)
-            self._draw_path(picture, self._blocks, nodes_m)
+            places_m = self._blocks.carried.places_m(nodes_m)
+            self._draw_blocks(places_m, kinds)
+            self._draw_path(path_of(picture, dict(zip(self._blocks.names, places_m, strict=True))))
 
     def _draw_instruments(self, robot: RobotState) -> None:
         for name, arm in robot.arms.items():
@@ -198,8 +201,8 @@ class Scene:
                 colour = ARM_COLOURS.get(name, COVERED)
                 self._mesh(f"/instruments/{name}", instrument_mesh(instrument(arm)), colour)
 
-    def _draw_blocks(self, blocks: Blocks, kinds: Sequence[BlockKind], nodes_m: FloatArray) -> None:
-        places = (blocks.carried.places_m(nodes_m) + ABOVE_M).astype(np.float32)
+    def _draw_blocks(self, places_m: FloatArray, kinds: Sequence[BlockKind]) -> None:
+        places = (places_m + ABOVE_M).astype(np.float32)
         colours = np.array([BLOCK_COLOURS[one] for one in kinds], dtype=np.uint8).reshape(-1, 3)
         handle = self._nodes.get("/points")
         if handle is None or len(handle.batched_positions) != len(places):
@@ -213,10 +216,7 @@ class Scene:
             handle.on_click(self._clicked)
             self._nodes["/points"] = handle
             return
-        if not np.array_equal(handle.batched_positions, places):
-            handle.batched_positions = places
-        if not np.array_equal(handle.batched_colors, colours):
-            handle.batched_colors = colours
+        handle.batched_positions, handle.batched_colors = places, colours
 
     async def _clicked(self, event: viser.SceneNodePointerEvent[Any]) -> None:
         blocks, number = self._blocks, event.instance_index
@@ -224,25 +224,22 @@ class Scene:
         if surgeon and blocks is not None and number is not None and number < len(blocks.names):
             self._on_block(blocks.names[number])
 
-    def _draw_path(self, picture: Picture, blocks: Blocks, nodes_m: FloatArray) -> None:
-        places = blocks.carried.places_m(nodes_m)
-        dashes_m = path_of(picture, dict(zip(blocks.names, places, strict=True)))
+    def _draw_path(self, dashes_m: FloatArray) -> None:
+        dashes = dashes_m.astype(np.float32)
         handle = self._nodes.get("/path")
         if handle is None:
             self._nodes["/path"] = self._server.scene.add_line_segments(
-                "/path", dashes_m.astype(np.float32), PATH, thickness=0.0008
+                "/path", dashes, PATH, thickness=0.0008
             )
-        elif not np.array_equal(handle.points, dashes_m):
-            handle.points = dashes_m.astype(np.float32)
+        else:
+            handle.points = dashes
 
     def _mark_target(self, visible: bool) -> None:
         colour = VISIBLE if visible else COVERED
         for name in ("/target/ring", "/target/centre"):
-            if self._nodes[name].color != colour:
-                self._nodes[name].color = colour
+            self._nodes[name].color = colour
         text = "target region: visible" if visible else "target region: covered"
-        if self._nodes["/target/label"].text != text:
-            self._nodes["/target/label"].text = text
+        self._nodes["/target/label"].text = text
 
     def _mesh(self, name: str, mesh: Mesh, colour: tuple[int, int, int]) -> None:
         handle = self._nodes.get(name)
@@ -251,7 +248,7 @@ class Scene:
                 name, mesh.vertices_m, mesh.faces, color=colour, cast_shadow=False,
                 receive_shadow=False,
             )  # fmt: skip
-        elif not np.array_equal(handle.vertices, mesh.vertices_m):
+        else:
             handle.vertices = mesh.vertices_m
 
 
