@@ -55,22 +55,8 @@ format: $(VENV)/.installed-dev ## format and mend what can be mended
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-bench: $(VENV)/.installed-dev ## measure; figures belong into docs/benchmarks.md
-	$(BIN)/fras bench loop
-	$(BIN)/fras bench fe
-	$(BIN)/fras bench mesh
-	$(BIN)/fras bench planner
-	$(BIN)/fras bench criteria
-	$(BIN)/fras bench awareness
-	$(BIN)/fras bench motion
-	$(BIN)/fras bench recorder
-	$(BIN)/fras bench log
-	$(BIN)/fras bench replay
-	$(BIN)/fras bench secure
-	-$(BIN)/fras bench page # needs make browser
-	$(BIN)/fras bench start
-	$(BIN)/fras bench soak --trials 200 --mesh 11,13,2
-	-$(BIN)/fras bench hosts # needs root
+bench: $(VENV)/.installed-dev ## measure all there is, briefly, and write the table of docs/benchmarks.md
+	$(BIN)/fras bench all --page docs/benchmarks.md
 
 BROWSER := chromium-headless-shell
 

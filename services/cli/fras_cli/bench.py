@@ -12,6 +12,7 @@ from fras_common.errors import FrasError
 
 # Name, module, what it measures. Modules of `benchmarks/` need the checkout.
 BENCHMARKS: dict[str, tuple[str, str]] = {
+    "all": ("benchmarks.brief", "All of them briefly, in a quarter of an hour; one table."),
     "fe": ("benchmarks.fe", "The finite elements against MuJoCo flex and felupe, by mesh."),
     "mesh": ("benchmarks.fe_mesh", "How much a finer mesh changes the force of a pull."),
     "stress": ("fras_sim.stress", "10,000 steps that try to break the tissue."),
