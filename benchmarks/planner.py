@@ -9,7 +9,7 @@ new Control for each number of steps, `one` a new Control for each plan. All ran
 criterion `literal`, the paper's formula as printed, and their choices must be worth the same, by
 clingo's own optimum and by numpy's, or the run fails. The region of interest lies at the centre
 of a block, since the paper measures from block to block. FRAS is measured with its default
-criterion `weighted` too. Each measurement has a process of its own; a baseline that does not
+criterion `capped` too. Each measurement has a process of its own; a baseline that does not
 finish within the budget is said so, and what is larger is not tried.
 """
 
@@ -37,7 +37,7 @@ from benchmarks.planner_jobs import (
 )
 
 SIZES = (5, 6, 7, 8, 9, 10, 20, 40)
-CRITERIA = ("literal", "weighted")
+CRITERIA = ("literal", "capped")
 VARIANTS = ("fresh", "one")
 OUT = Path("runs/bench")
 BUDGET_S = 20.0

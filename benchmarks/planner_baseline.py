@@ -21,6 +21,8 @@ from fras_planner.planning.measures import whole_mm
 
 PROGRAM = Path(__file__).with_suffix(".lp")
 MAX_STEPS = 6
+ENOUGH_MM = 25
+"""From where on distance from an attachment counts no more, as in `asp/preferences/capped.lp`."""
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
@@ -65,13 +67,13 @@ def literal(geometry: Geometry) -> Ints:
     return sums - _roi_mm(geometry)
 
 
-def weighted(geometry: Geometry) -> Ints:
+def capped(geometry: Geometry) -> Ints:
     """Score of each block by the planner's default."""
     apart = _apart_mm(geometry.blocks_m, geometry.blocks_m[geometry.fixed])
-    return 2 * apart.min(axis=1) - _roi_mm(geometry)
+    return 2 * np.minimum(apart.min(axis=1), ENOUGH_MM) - _roi_mm(geometry)
 
 
-SCORES: dict[str, Callable[[Geometry], Ints]] = {"literal": literal, "weighted": weighted}
+SCORES: dict[str, Callable[[Geometry], Ints]] = {"literal": literal, "capped": capped}
 
 
 def best_block(geometry: Geometry, criterion: str) -> int:

@@ -45,10 +45,10 @@ def test_a_rule_changed_changes_the_plan(copy: Path) -> None:
     rows = [(0, 0, 0), (0, 0.01, 0), (0, 0.02, 0)]
     statics = [*(f"reachable(psm1,{name})" for name in names), "fixed(b(1,1))"]
     scene = PlanningScene.make(names, rows, (0, 0.01, 0), statics)
-    assert Planner(load_knowledge(copy), scene).plan([]).target == "b(1,3)"
+    assert Planner(load_knowledge(copy), scene, "weighted").plan([]).target == "b(1,3)"
     weighted = copy / "preferences" / "weighted.lp"
     weighted.write_text(weighted.read_text().replace("2*Gap-Roi", "Gap-2*Roi"))
-    assert Planner(load_knowledge(copy), scene).plan([]).target == "b(1,2)"
+    assert Planner(load_knowledge(copy), scene, "weighted").plan([]).target == "b(1,2)"
 
 
 def test_a_criterion_of_ones_own(copy: Path) -> None:

@@ -157,8 +157,8 @@ def fingerprint(knowledge: Knowledge) -> Iterator[object]:
         planner = Planner(knowledge, tissue, criterion, goal, horizon)
         for state in states:
             yield outcome(planned, planner, state)
-    yield Planner(knowledge, TISSUE, conflict_budget=0).plan([]).explanation
-    late = Planner(knowledge, TISSUE, clock=count(step=60.0).__next__)
+    yield Planner(knowledge, TISSUE, "weighted", conflict_budget=0).plan([]).explanation
+    late = Planner(knowledge, TISSUE, "weighted", clock=count(step=60.0).__next__)
     yield late.plan([]).explanation
     for state in SMALL_STATES:
         yield courses(knowledge, state, best=False)
@@ -238,8 +238,8 @@ def answers(knowledge: Knowledge) -> Iterator[object]:
     for rule in OWN_RULES:
         files = dict(knowledge.files)
         files["constraints.lp"] += rule
-        yield outcome(Planner(Knowledge(files, ""), TISSUE).why_not, "b(3,3)", [])
-    spent = Planner(knowledge, TISSUE, conflict_budget=0)
+        yield outcome(Planner(Knowledge(files, ""), TISSUE, "weighted").why_not, "b(3,3)", [])
+    spent = Planner(knowledge, TISSUE, "weighted", conflict_budget=0)
     yield outcome(spent.why_not, "reach(psm2,b(3,3))", [])
 
 
@@ -264,7 +264,7 @@ MEASURED = {
 
 def occasions(knowledge: Knowledge) -> Iterator[object]:
     """What is said of a plan because of when and upon what numbers it is made."""
-    planner = Planner(knowledge, TISSUE)
+    planner = Planner(knowledge, TISSUE, "weighted")
     for reason in REASONS:
         for state in ("", f"{HELD} {LIMIT}", "rejected(b(3,3)) barred(psm2)", MANY):
             plan = planner.plan(state.split(), reason=reason, evidence=MEASURED)
@@ -279,7 +279,9 @@ def explained(knowledge: Knowledge) -> Iterator[object]:
     for arm in ("psm1", "psm2"):
         tried = [f"tried(b({i},{j}))" for i in ROWS for j in (1, 3)]
         yield outcome(
-            planned, Planner(knowledge, TISSUE), " ".join([*tried, f"closed_gripper({arm})"])
+            planned,
+            Planner(knowledge, TISSUE, "weighted"),
+            " ".join([*tried, f"closed_gripper({arm})"]),
         )
 
 

@@ -27,7 +27,7 @@ def scene(make_scene: SceneMaker) -> PlanningScene:
 
 @pytest.fixture(scope="module")
 def planner(knowledge: Knowledge, scene: PlanningScene) -> Planner:
-    return Planner(knowledge, scene)
+    return Planner(knowledge, scene, "weighted")
 
 
 def texts(plan: Plan) -> list[str]:
@@ -181,7 +181,7 @@ def test_goal_clear_asks_for_a_move_after_each_crossing(
 ) -> None:
     state = [*held("b(7,3)"), "max_height(psm1)", "visible_roi"]
     assert planner.plan(state).actions == ()
-    clear = Planner(knowledge, scene, goal="clear")
+    clear = Planner(knowledge, scene, "weighted", goal="clear")
     assert texts(clear.plan(state)) == ["move(psm1,b(5,3))"]
     assert clear.plan(["visible_roi"]).actions == ()
 
@@ -199,7 +199,7 @@ def test_times_come_from_the_clock_that_is_given(
     knowledge: Knowledge, scene: PlanningScene
 ) -> None:
     ticks = iter(range(100))
-    planner = Planner(knowledge, scene, clock=lambda: float(next(ticks)))
+    planner = Planner(knowledge, scene, "weighted", clock=lambda: float(next(ticks)))
     first, second = planner.plan([]), planner.plan([])
     # Between the two looks before and after a search, the search itself looks twice.
     assert (first.ground_s, first.solve_s, first.told_s) == (1.0, 3.0, 1.0)

@@ -17,7 +17,7 @@ def scene(four_blocks: PlanningScene) -> PlanningScene:
 
 @pytest.fixture(scope="module")
 def planner(knowledge: Knowledge, scene: PlanningScene) -> Planner:
-    return Planner(knowledge, scene)
+    return Planner(knowledge, scene, "weighted")
 
 
 def bare(scene: PlanningScene, *statics: str) -> PlanningScene:
@@ -43,14 +43,14 @@ def test_a_choice_that_ignores_attachments_says_so(planner: Planner) -> None:
 
 def test_a_choice_without_attachments_says_so(knowledge: Knowledge, scene: PlanningScene) -> None:
     free = bare(scene, *(atom for atom in scene.statics if not atom.startswith("fixed")))
-    assert Planner(knowledge, free).plan([], tried=["b(1,1)"]).explanation[1] == (
+    assert Planner(knowledge, free, "weighted").plan([], tried=["b(1,1)"]).explanation[1] == (
         "psm2 grasps b(1,2): no attachment is known, 10 mm from the region of interest; "
         "best of 3 candidate blocks under the criterion 'weighted'."
     )
 
 
 def test_of_two_arms_the_choice_is_told(knowledge: Knowledge, scene: PlanningScene) -> None:
-    both = Planner(knowledge, bare(scene, *scene.statics, "reachable(psm1,b(2,2))"))
+    both = Planner(knowledge, bare(scene, *scene.statics, "reachable(psm1,b(2,2))"), "weighted")
     assert both.plan([]).explanation[0] == (
         "psm1 goes for b(2,2): both arms reach it, and psm1 comes first."
     )
@@ -98,7 +98,7 @@ def test_what_follows_from_the_state_is_told(
 def test_tissue_that_cannot_be_moved_is_let_go(knowledge: Knowledge, scene: PlanningScene) -> None:
     lost = bare(scene, *(atom for atom in scene.statics if not atom.startswith("above_roi")))
     state = ["in_hand(psm1,b(2,1))", "closed_gripper(psm1)", "max_height(psm1)"]
-    plan = Planner(knowledge, lost).plan(state)
+    plan = Planner(knowledge, lost, "weighted").plan(state)
     assert plan.actions[0].text == "release(psm1)"
     assert plan.explanation[0] == ("psm1 lets go of b(2,1) so that the tissue can be grasped anew.")
 
@@ -194,7 +194,7 @@ def test_everything_tried(planner: Planner, scene: PlanningScene) -> None:
 
 def test_everything_attached(knowledge: Knowledge, scene: PlanningScene) -> None:
     attached = bare(scene, *scene.statics, *(f"fixed({name})" for name in scene.names))
-    planner = Planner(knowledge, attached)
+    planner = Planner(knowledge, attached, "weighted")
     plan = planner.plan([])
     assert plan.actions == ()
     assert plan.no_plan is not None
@@ -214,14 +214,14 @@ def test_attached_or_tried_between_them(planner: Planner) -> None:
 
 
 def test_nothing_in_reach(knowledge: Knowledge, scene: PlanningScene) -> None:
-    none = Planner(knowledge, bare(scene, "fixed(b(1,1))")).plan([]).no_plan
+    none = Planner(knowledge, bare(scene, "fixed(b(1,1))"), "weighted").plan([]).no_plan
     assert none is not None
     assert none.core == ("see_roi",)
     assert "No arm reaches any block." in none.sentences
 
 
 def test_nowhere_to_move(knowledge: Knowledge, scene: PlanningScene) -> None:
-    stuck = Planner(knowledge, bare(scene, "reachable(psm1,b(2,1))"))
+    stuck = Planner(knowledge, bare(scene, "reachable(psm1,b(2,1))"), "weighted")
     state = ["in_hand(psm1,b(2,1))", "closed_gripper(psm1)", "max_height(psm1)"]
     none = stuck.plan(state, tried=["b(2,1)"]).no_plan
     assert none is not None
@@ -232,7 +232,7 @@ def test_nowhere_to_move(knowledge: Knowledge, scene: PlanningScene) -> None:
 
 
 def test_a_horizon_too_short(knowledge: Knowledge, scene: PlanningScene) -> None:
-    none = Planner(knowledge, scene, horizon=2).plan([]).no_plan
+    none = Planner(knowledge, scene, "weighted", horizon=2).plan([]).no_plan
     assert none is not None
     assert none.sentences[0] == "No plan of at most 2 actions reaches the goal."
     assert none.sentences[-1] == "3 candidate blocks are left, but 2 actions are too few."
@@ -242,14 +242,14 @@ def test_each_core_is_needed_whole(knowledge: Knowledge, make_scene: SceneMaker)
     """With any rule of a core struck from the knowledge there is a plan."""
     scene = make_scene(3, 1, fixed=["b(1,1)", "b(2,2)"])
     tried = [name for name in scene.names if name not in {"b(1,1)", "b(2,2)"}]
-    none = Planner(knowledge, scene).plan([], tried=tried).no_plan
+    none = Planner(knowledge, scene, "weighted").plan([], tried=tried).no_plan
     assert none is not None
     assert len(none.core) == 3
     for rule in none.core:
         files = dict(knowledge.files)
         assert f"{rule};" in files["constraints.lp"]
         files["constraints.lp"] = files["constraints.lp"].replace(f"{rule};", "", 1)
-        lifted = Planner(Knowledge(files, ""), scene).plan([], tried=tried)
+        lifted = Planner(Knowledge(files, ""), scene, "weighted").plan([], tried=tried)
         assert lifted.no_plan is None, rule
 
 
@@ -265,7 +265,9 @@ def test_an_arm_stuck_at_its_limit_with_the_roi_seen(
     knowledge: Knowledge, scene: PlanningScene
 ) -> None:
     state = ["in_hand(psm1,b(2,1))", "closed_gripper(psm1)", "max_height(psm1)", "visible_roi"]
-    none = Planner(knowledge, scene, goal="clear").plan(state, tried=scene.names).no_plan
+    none = (
+        Planner(knowledge, scene, "weighted", goal="clear").plan(state, tried=scene.names).no_plan
+    )
     assert none is not None
     assert none.core == ("end_below_limit", "see_roi", "try_once")
     assert "Rule: No arm may end at its limit." in none.sentences
@@ -274,7 +276,7 @@ def test_an_arm_stuck_at_its_limit_with_the_roi_seen(
 def test_a_spent_budget_is_said_without_blaming_a_rule(
     knowledge: Knowledge, scene: PlanningScene
 ) -> None:
-    plan = Planner(knowledge, scene, conflict_budget=0).plan([])
+    plan = Planner(knowledge, scene, "weighted", conflict_budget=0).plan([])
     assert plan.no_plan is not None
     assert not plan.optimal
     assert plan.no_plan.core == ("search_budget",)
@@ -299,7 +301,7 @@ def test_time_may_end_a_search_only_without_a_plan(
     knowledge: Knowledge, scene: PlanningScene
 ) -> None:
     watch = Watch(6.0)
-    planner = Planner(knowledge, scene, clock=watch)
+    planner = Planner(knowledge, scene, "weighted", clock=watch)
     late = planner.plan([])
     assert late.no_plan is not None
     assert late.actions == ()
@@ -307,14 +309,14 @@ def test_time_may_end_a_search_only_without_a_plan(
     assert late.no_plan.core == ("search_time",)
     assert late.explanation == ("The time for planning was over before an answer was found.",)
     watch.step_s = 0.0
-    assert planner.plan([]).actions == Planner(knowledge, scene).plan([]).actions
+    assert planner.plan([]).actions == Planner(knowledge, scene, "weighted").plan([]).actions
 
 
 def test_time_may_end_the_search_for_a_minimal_core(
     knowledge: Knowledge, scene: PlanningScene
 ) -> None:
     watch = Watch(0.0)
-    planner = Planner(knowledge, scene, clock=watch)
+    planner = Planner(knowledge, scene, "weighted", clock=watch)
     proved = planner.plan([], tried=scene.names).no_plan
     assert proved is not None
     assert "try_once" in proved.core
@@ -326,7 +328,7 @@ def test_time_may_end_the_search_for_a_minimal_core(
 
 def test_a_search_under_way_is_ended_in_time(knowledge: Knowledge, make_scene: SceneMaker) -> None:
     # Without a clock each search may take the whole limit, here less than any search of this size.
-    planner = Planner(knowledge, make_scene(40, 1), time_limit_s=1e-5)
+    planner = Planner(knowledge, make_scene(40, 1), "weighted", time_limit_s=1e-5)
     late = planner.plan([])
     assert late.no_plan is not None
     assert late.no_plan.core == ("search_time",)
@@ -339,8 +341,8 @@ def test_a_small_budget_gives_the_best_plan_so_far(
     for seed in range(10):
         scene = make_scene(7, seed)
         tried = scene.names[:9]
-        best = Planner(knowledge, scene).plan([], tried=tried)
-        hasty = Planner(knowledge, scene, conflict_budget=1).plan([], tried=tried)
+        best = Planner(knowledge, scene, "weighted").plan([], tried=tried)
+        hasty = Planner(knowledge, scene, "weighted", conflict_budget=1).plan([], tried=tried)
         if hasty.no_plan is None:
             assert hasty.actions[-1].name == "pull"
             assert hasty.cost >= best.cost

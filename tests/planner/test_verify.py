@@ -218,7 +218,7 @@ def test_every_plan_keeps_to_all(knowledge: Knowledge, make_scene: SceneMaker, g
     kinds: set[str] = set()
     for seed in range(4):
         scene = make_scene(4, seed)
-        planner = Planner(knowledge, scene, goal=goal)
+        planner = Planner(knowledge, scene, "weighted", goal=goal)
         for _ in range(40):
             state = random_state(rng, scene.names)
             tried = [name for name in scene.names if rng.random() < 0.2]

@@ -27,7 +27,7 @@ def scene(four_blocks: PlanningScene) -> PlanningScene:
 
 @pytest.fixture(scope="module")
 def planner(knowledge: Knowledge, scene: PlanningScene) -> Planner:
-    return Planner(knowledge, scene)
+    return Planner(knowledge, scene, "weighted")
 
 
 ATTACHED = (
@@ -163,7 +163,7 @@ def test_with_attachments_ignored_the_way_to_the_roi_counts(planner: Planner) ->
 def test_without_any_plan_a_block_is_not_at_fault(
     knowledge: Knowledge, scene: PlanningScene
 ) -> None:
-    short = Planner(knowledge, scene, horizon=2)
+    short = Planner(knowledge, scene, "weighted", horizon=2)
     assert short.why_not("b(2,2)", []).sentences == (
         "b(2,2) could be grasped, but there is no plan at all.",
     )
@@ -173,7 +173,9 @@ def test_without_any_plan_a_block_is_not_at_fault(
 
 
 def test_a_spent_budget_decides_nothing(knowledge: Knowledge, scene: PlanningScene) -> None:
-    answer = Planner(knowledge, scene, conflict_budget=0).why_not("reach(psm2,b(2,2))", [])
+    answer = Planner(knowledge, scene, "weighted", conflict_budget=0).why_not(
+        "reach(psm2,b(2,2))", []
+    )
     assert answer.rules == ()
     assert answer.sentences == (
         "The search ended before that was decided: allow it more conflicts or more time.",
@@ -184,12 +186,12 @@ def test_equals_differ_by_their_indices(knowledge: Knowledge) -> None:
     names = ["b(1,1)", "b(2,2)"]
     statics = [f"reachable(psm1,{name})" for name in names]
     both = PlanningScene.make(names, [(0, 0, 0), (0.02, 0, 0)], (0.01, 0, 0), statics)
-    answer = Planner(knowledge, both).why_not("b(2,2)", [])
+    answer = Planner(knowledge, both, "weighted").why_not("b(2,2)", [])
     assert answer.sentences[0] == (
         "b(2,2) could be grasped and is as good as b(1,1): between equals the smallest indices "
         "count."
     )
-    answer = Planner(knowledge, both).why_not("reach(psm1,b(2,2))", [])
+    answer = Planner(knowledge, both, "weighted").why_not("reach(psm1,b(2,2))", [])
     assert answer.sentences == (
         "It is possible, but leads to another block of equal worth with larger indices.",
     )
@@ -198,7 +200,7 @@ def test_equals_differ_by_their_indices(knowledge: Knowledge) -> None:
 def test_the_other_arm_and_one_action_more(knowledge: Knowledge) -> None:
     statics = ["reachable(psm1,b(1,1))", "reachable(psm2,b(1,1))"]
     one = PlanningScene.make(["b(1,1)"], [(0, 0, 0)], (0, 0, 0), statics)
-    planner = Planner(knowledge, one)
+    planner = Planner(knowledge, one, "weighted")
     assert planner.why_not("reach(psm2,b(1,1))", []).sentences == (
         "It is possible, but the other arm comes first where both serve.",
     )
@@ -277,7 +279,7 @@ def test_a_rule_of_ones_own_is_the_answer(
     either = PlanningScene.make(
         scene.names, scene.blocks_m, scene.roi_m, {*scene.statics, "reachable(psm1,b(2,2))"}
     )
-    planner = Planner(Knowledge(files, ""), either)
+    planner = Planner(Knowledge(files, ""), either, "weighted")
     assert planner.why_not("b(2,2)", []).sentences == sentences
     assert planner.why_not("b(1,1)", []).sentences == ATTACHED
 
@@ -287,7 +289,7 @@ def test_asking_changes_no_plan(knowledge: Knowledge, make_scene: SceneMaker) ->
     rng = np.random.default_rng(5)
     for seed in range(6):
         made = make_scene(5, seed)
-        planner = Planner(knowledge, made)
+        planner = Planner(knowledge, made, "weighted")
         before = planner.plan([])
         for name in rng.choice(made.names, size=5):
             answer = planner.why_not(str(name), [])
@@ -299,10 +301,12 @@ def test_asking_changes_no_plan(knowledge: Knowledge, make_scene: SceneMaker) ->
 
 
 def test_time_that_is_over_decides_nothing(knowledge: Knowledge, scene: PlanningScene) -> None:
-    in_time = Planner(knowledge, scene).why_not("reach(psm1,b(1,1))", [])
+    in_time = Planner(knowledge, scene, "weighted").why_not("reach(psm1,b(1,1))", [])
     ticks = iter(range(0, 1000, 2))
     # Enough for the plan, not for the other one beside it.
-    planner = Planner(knowledge, scene, time_limit_s=5.0, clock=lambda: float(next(ticks)))
+    planner = Planner(
+        knowledge, scene, "weighted", time_limit_s=5.0, clock=lambda: float(next(ticks))
+    )
     late = planner.why_not("reach(psm1,b(1,1))", [])
     assert late.rules == ()
     assert late.sentences != in_time.sentences

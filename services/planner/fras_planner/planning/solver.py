@@ -80,7 +80,7 @@ class Planner:
         self,
         knowledge: Knowledge,
         scene: PlanningScene,
-        criterion: str = "weighted",
+        criterion: str = "capped",
         goal: str = "visible",
         horizon: int = HORIZON,
         seed: int = SEED,
