@@ -293,7 +293,7 @@ def test_keys_that_others_may_use_are_refused(folder: Path):
 
 def test_a_folder_that_others_may_look_into_gets_no_keys(tmp_path: Path):
     (tmp_path / "keys").mkdir(mode=0o755)
-    with pytest.raises(BadKeys, match="others may look into it: chmod 700"):
+    with pytest.raises(BadKeys, match="others may look into it: `chmod 700"):
         init_keys(tmp_path / "keys", NOW)
     assert list((tmp_path / "keys").iterdir()) == []
 
