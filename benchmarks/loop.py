@@ -22,6 +22,7 @@ from typing import Any
 
 import numpy as np
 import zenoh
+from benchmarks.telling import tell_figures
 from numpy.typing import NDArray
 
 from fras_cli.log_info import tally
@@ -161,11 +162,7 @@ def main() -> None:
     parser.add_argument("--json", type=Path, help="also write the figures there")
     options = parser.parse_args()
     figures = measure(options.trials)
-    width = max(map(len, figures))
-    for name, value in figures.items():
-        print(f"{name:{width}}  {value}")
-    if options.json:
-        options.json.write_text(json.dumps(figures, indent=2) + "\n")
+    tell_figures(figures, options.json)
 
 
 if __name__ == "__main__":

@@ -1,8 +1,10 @@
 """On what machine a benchmark ran."""
 
+import os
 import platform
 import re
 from pathlib import Path
+from typing import Any
 
 
 def processor() -> str:
@@ -12,3 +14,8 @@ def processor() -> str:
     except OSError:
         found = None
     return found[1] if found else platform.processor()
+
+
+def machine() -> dict[str, Any]:
+    """What a report says of the machine."""
+    return {"processor": processor(), "cores": os.cpu_count()}

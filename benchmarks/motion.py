@@ -9,14 +9,13 @@ numpy (`benchmarks/psm_reference.py`), not from motion's own kinematics.
 
 import argparse
 import json
-import os
 from collections.abc import Callable
 from pathlib import Path
 from time import monotonic
 from typing import Any
 
 import matplotlib as mpl
-from benchmarks.machine import processor
+from benchmarks.machine import machine
 from benchmarks.motion_jobs import Motion, Recorder, strayed, used_limits
 from benchmarks.motion_reach import draw, reachability
 from benchmarks.motion_stops import measure_stops
@@ -27,6 +26,7 @@ from benchmarks.motion_times import (
     paced_ticks,
     spread_us,
 )
+from benchmarks.telling import target_lines, target_rows
 
 mpl.use("Agg")
 
@@ -140,16 +140,15 @@ def main() -> None:
             f"range ({whole['joint']}), over its half {100 * half['margin']:.1f} % "
             f"({half['joint']})"
         )
-    for text, value, enough in reached:
-        print(f"{'met' if enough else 'MISSED':8}{value:>14}  {text}")
+    print(target_lines(reached))
     options.out.mkdir(parents=True, exist_ok=True)
     draw(maps, reach, options.out / "reachability.png")
     setting = {name: value for name, value in vars(options).items() if name != "out"}
     full: Raw = {
-        "machine": {"processor": processor(), "cores": os.cpu_count()},
+        "machine": machine(),
         "setting": setting,
         **report,
-        "targets": [{"what": t, "value": v, "met": enough} for t, v, enough in reached],
+        "targets": target_rows(reached),
     }
     (options.out / "motion.json").write_text(json.dumps(full, indent=2) + "\n")
     print(f"written: {options.out / 'motion.json'}, {options.out / 'reachability.png'}")

@@ -5,7 +5,6 @@ from typing import Any
 Raw = dict[str, Any]
 
 DT_MS = 20.0
-IK_MOST_US = 200.0
 EXACT = 1e-6
 MOTIONS = 1000
 # Of limits that a motion uses fully: differences of numbers near 0.1 over 20 ms, three times.

@@ -7,7 +7,6 @@ how soon after a page is opened tissue is drawn, by a headless browser without a
 """
 
 import argparse
-import json
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -25,6 +24,7 @@ from benchmarks.page_jobs import (
     watched,
 )
 from benchmarks.surgeon import SurgeonsPage, served
+from benchmarks.telling import tell_figures
 from benchmarks.theatre import Theatre
 
 from fras_cli.stack import UsedStack, own_stack
@@ -121,11 +121,7 @@ def main() -> None:
             opens=options.opens,
             scene=options.scene,
         )
-    width = max(map(len, figures))
-    for what, value in figures.items():
-        print(f"{what:{width}}  {value}")
-    if options.json:
-        options.json.write_text(json.dumps(figures, indent=2) + "\n")
+    tell_figures(figures, options.json)
 
 
 if __name__ == "__main__":

@@ -15,7 +15,6 @@ finish within the budget is said so, and what is larger is not tried.
 
 import argparse
 import json
-import os
 from collections.abc import Callable
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
@@ -23,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from benchmarks.machine import processor
+from benchmarks.machine import machine
 from benchmarks.planner_figure import criteria_table, draw, main_table, targets
 from benchmarks.planner_jobs import (
     Raw,
@@ -35,6 +34,7 @@ from benchmarks.planner_jobs import (
     measure_reasons,
     percentile_ms,
 )
+from benchmarks.telling import target_lines, target_rows
 
 SIZES = (5, 6, 7, 8, 9, 10, 20, 40)
 CRITERIA = ("literal", "capped")
@@ -203,19 +203,18 @@ def main() -> None:
         f"why no plan {reasons['core_p50_ms']} ms (p99 {reasons['core_p99_ms']}), "
         f"{VERIFIED_STEPS:,} steps verified in {reasons['verify_ms']} ms"
     )
-    for text, value, enough in reached:
-        print(f"{'met' if enough else 'MISSED':8}{value:>14}  {text}")
+    print(target_lines(reached))
     options.out.mkdir(parents=True, exist_ok=True)
     exponents = draw(result, VARIANTS, CRITERIA, options.out / "planner.png")
     report = {
-        "machine": {"processor": processor(), "cores": os.cpu_count()},
+        "machine": machine(),
         "setting": {"repeats": options.repeats, "budget_s": options.budget},
         "compared_by": CRITERIA[0],
         "sizes": result,
         "memory_over_replans": flat,
         "reasons": reasons,
         "growth_exponents": exponents,
-        "targets": [{"what": t, "value": v, "met": enough} for t, v, enough in reached],
+        "targets": target_rows(reached),
     }
     (options.out / "planner.json").write_text(json.dumps(report, indent=2) + "\n")
     print(f"written: {options.out / 'planner.json'}, {options.out / 'planner.png'}")

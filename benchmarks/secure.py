@@ -6,7 +6,6 @@ time from one robot state to the next, all services and the recorder included.
 """
 
 import argparse
-import json
 import tempfile
 from collections.abc import Iterable
 from itertools import pairwise
@@ -15,6 +14,7 @@ from typing import Any
 
 import numpy as np
 from benchmarks.loop import Floats, overhead_ms, percentiles
+from benchmarks.telling import tell_figures
 
 from fras_cli.options import build_scenario
 from fras_cli.report import read_trial
@@ -90,11 +90,7 @@ def main() -> None:
     parser.add_argument("--json", type=Path, help="also write the figures there")
     options = parser.parse_args()
     figures = measure(range(1, options.trials + 1))
-    width = max(map(len, figures))
-    for name, value in figures.items():
-        print(f"{name:{width}}  {value}")
-    if options.json:
-        options.json.write_text(json.dumps(figures, indent=2) + "\n")
+    tell_figures(figures, options.json)
 
 
 if __name__ == "__main__":

@@ -13,11 +13,10 @@ from tests.cli.report import conftest as made
 from typer.testing import CliRunner
 
 from fras_cli.app import app
-from fras_cli.failures import exit_status
 from fras_cli.progress import read_progress
-from fras_common.errors import FrasError
 from fras_log import LogFile, Signer
 from fras_log.keys import default_key_path, load_or_make
+from support.log_command import fras_log
 
 
 @pytest.fixture(scope="module")
@@ -58,14 +57,9 @@ def path(tmp_path: Path, whole: bytes) -> Path:
 
 
 def fras(*arguments: Any) -> tuple[int, str]:
-    """Exit status and all that is said; a known error as the command's main does it."""
-    result = CliRunner().invoke(
-        app, ["log", *map(str, arguments)], env={"COLUMNS": "300", "TERM": "dumb"}
-    )
-    if isinstance(result.exception, FrasError):
-        return exit_status(result.exception), f"{result.output}fras: {result.exception}"
-    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
-    return result.exit_code, " ".join(result.output.split())
+    """Exit status and all that is said, as one line."""
+    status, said = fras_log(*arguments)
+    return status, " ".join(said.split())
 
 
 def test_what_this_machine_signed_is_authentic(path: Path):

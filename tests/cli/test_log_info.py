@@ -3,7 +3,6 @@
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import msgspec
 import pytest
@@ -12,17 +11,16 @@ from tests.cli.report import conftest as made
 from typer.testing import CliRunner
 
 from fras_cli.app import app
-from fras_cli.failures import exit_status
 from fras_cli.log_info import LogInfo, read_info
 from fras_cli.report import read_trial, summarise
 from fras_common.digests import own_table_digest
-from fras_common.errors import FrasError
 from fras_common.messages import LogRecord
 from fras_common.topics import topic_of
 from fras_log import LogFile, Signer
 from fras_log.attachments import read_attachments
 from fras_log.keys import load_or_make
 from support.forger import metadata, put_together, read, take_apart
+from support.log_command import fras_log
 
 FILES = {
     "scenario.toml": b"seed = 7\n",
@@ -87,20 +85,9 @@ def forged_signature(log: bytes) -> bytes:
     return put_together([*pieces[:-1], signed])
 
 
-def fras(*arguments: Any) -> tuple[int, str]:
-    """Exit status and all that is said; a known error as the command's main does it."""
-    result = CliRunner().invoke(
-        app, ["log", *map(str, arguments)], env={"COLUMNS": "300", "TERM": "dumb"}
-    )
-    if isinstance(result.exception, FrasError):
-        return exit_status(result.exception), f"{result.output}fras: {result.exception}"
-    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
-    return result.exit_code, result.output
-
-
 def info(path: Path) -> LogInfo:
     """What `--json` prints, as the type that describes it."""
-    status, said = fras("info", path, "--json")
+    status, said = fras_log("info", path, "--json")
     assert status == 0
     return msgspec.json.decode(said, type=LogInfo, strict=True)
 
@@ -161,7 +148,7 @@ def test_duration_and_rate_are_those_of_the_messages(tmp_path: Path) -> None:
 
 def test_people_are_told_the_same(whole: Whole, told: LogInfo) -> None:
     path = whole.path
-    status, said = fras("info", path)
+    status, said = fras_log("info", path)
     words = " ".join(said.split())
     assert status == 0
     for text in (
@@ -191,7 +178,7 @@ def test_what_the_log_does_not_say_is_not_made_up(tmp_path: Path) -> None:
     assert told.own_topics is None
     assert not told.complete
     assert told.damage
-    words = " ".join(fras("info", path)[1].split())
+    words = " ".join(fras_log("info", path)[1].split())
     for text in ("cut off", "head not said", "signed no", "rules not said", "topics not said"):
         assert text in words
 
@@ -200,7 +187,7 @@ def test_a_table_of_another_version_is_told(tmp_path: Path) -> None:
     path = tmp_path / "audit.mcap"
     write(path, topics_digest="cd" * 32, host="[red]theatre[/]")
     assert info(path).own_topics is False
-    said = fras("info", path)[1]
+    said = fras_log("info", path)[1]
     assert f"{'cd' * 32}, another than here" in said
     assert "[red]theatre[/]" in said, "what a log says is no markup"
 
@@ -218,7 +205,7 @@ def test_a_key_that_is_none_is_no_signer(tmp_path: Path, key: str) -> None:
 
 
 def test_attachments_are_listed(whole: Whole) -> None:
-    status, said = fras("extract", whole.path)
+    status, said = fras_log("extract", whole.path)
     assert status == 0
     for name, data in FILES.items():
         (line,) = [line for line in said.splitlines() if name in line]
@@ -228,12 +215,12 @@ def test_attachments_are_listed(whole: Whole) -> None:
 
 def test_attachments_are_written_out_once(whole: Whole, tmp_path: Path) -> None:
     path, out = whole.path, tmp_path / "out"
-    status, said = fras("extract", path, "--out", out)
+    status, said = fras_log("extract", path, "--out", out)
     assert status == 0
     assert {name: (out / name).read_bytes() for name in FILES} == FILES
     assert all(str(out / name) in said for name in FILES)
     (out / "asp" / "goal.lp").write_bytes(b"mine")
-    status, said = fras("extract", path, "--out", out)
+    status, said = fras_log("extract", path, "--out", out)
     assert status == 2
     assert "exists and is not written over" in said
     assert (out / "asp" / "goal.lp").read_bytes() == b"mine"
@@ -242,7 +229,7 @@ def test_attachments_are_written_out_once(whole: Whole, tmp_path: Path) -> None:
 def test_a_log_without_attachments_is_told(tmp_path: Path) -> None:
     path = tmp_path / "audit.mcap"
     LogFile(path, OPENING, {}, 0).close({})
-    status, said = fras("extract", path)
+    status, said = fras_log("extract", path)
     assert status == 1
     assert "attaches no files" in said
 
@@ -250,7 +237,7 @@ def test_a_log_without_attachments_is_told(tmp_path: Path) -> None:
 def test_a_recovered_log_attaches_the_same(whole: Whole, tmp_path: Path) -> None:
     path = tmp_path / "audit.mcap"
     path.write_bytes(whole.path.read_bytes()[:-2000])
-    assert fras("recover", path)[0] == 0
+    assert fras_log("recover", path)[0] == 0
     recovered = tmp_path / "audit.recovered.mcap"
     assert read_attachments(recovered) == FILES
     assert info(recovered).asp_digest == "ab" * 32

@@ -34,7 +34,7 @@ def test_a_file_that_is_missing_is_named_with_what_makes_it(folder: Path, missin
 @pytest.mark.parametrize("mode", [0o640, 0o604, 0o620])
 def test_a_key_that_others_may_use_is_refused(folder: Path, mode: int):
     (folder / "sim.key").chmod(mode)
-    with pytest.raises(BadIdentity, match="others may use this key: chmod 600"):
+    with pytest.raises(BadIdentity, match="others may use this key: `chmod 600"):
         identity_in(folder, "sim")
 
 

@@ -89,7 +89,7 @@ def test_a_taken_port_is_named_and_ends_with_3(endpoint: str):
             check=False,
         )
     assert ended.returncode == 3
-    assert f"cannot listen on {endpoint}" in ended.stderr
+    assert f"can't listen on {endpoint}" in ended.stderr
     assert "Traceback" not in ended.stderr
 
 

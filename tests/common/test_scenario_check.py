@@ -160,12 +160,12 @@ def test_a_file_that_is_no_toml_is_named(written: Any, text: str):
 
 
 def test_a_file_that_cannot_be_read_is_named(tmp_path: Path):
-    with pytest.raises(ScenarioError, match="cannot be read"):
+    with pytest.raises(ScenarioError, match="can't be read"):
         load(tmp_path / "missing.toml")
-    with pytest.raises(ScenarioError, match="cannot be read"):
+    with pytest.raises(ScenarioError, match="can't be read"):
         load(tmp_path)
     (tmp_path / "bytes.toml").write_bytes(b"name = '\xff'")
-    with pytest.raises(ScenarioError, match="cannot be read"):
+    with pytest.raises(ScenarioError, match="can't be read"):
         load(tmp_path / "bytes.toml")
 
 

@@ -160,7 +160,7 @@ def test_what_cannot_be_is_named_with_its_place(tmp_path: Path, text: str):
         ('name = "x"\nseeds = "5..3"', "a range such as"),
         ('name = "x"\nseeds = 3', "str"),
         ('name = "x"\nscenario = "nowhere"', "neither a file"),
-        ('name = "x"\nscenario = "nowhere.toml"', "cannot be read"),
+        ('name = "x"\nscenario = "nowhere.toml"', "can't be read"),
         ('name = "x"\ndesign = "random"', "one-at-a-time"),
         ('name = "x"\nuntil = "dawn"', "end, plan"),
         ('name = "x"\nsed = "1..2"', "seeds"),
@@ -187,7 +187,7 @@ def test_whoever_is_not_there_is_told_who_is():
     with pytest.raises(BadCampaign, match="retraction") as caught:
         find_campaign("retracton")
     assert "faults" in str(caught.value)
-    with pytest.raises(BadCampaign, match="cannot be read"):
+    with pytest.raises(BadCampaign, match="can't be read"):
         read_campaign(find_campaign("nowhere.toml"))
 
 

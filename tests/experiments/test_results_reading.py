@@ -168,7 +168,7 @@ def test_a_header_alone_and_a_folder_of_something_else_are_named(folder: Path):
     with pytest.raises(BadResults, match=r"trials\.csv: no such file"):
         read_results(folder)
     (folder / "campaign.toml").unlink()
-    with pytest.raises(BadResults, match="is no folder of results"):
+    with pytest.raises(BadResults, match="is no folder that `fras experiment` wrote"):
         read_results(folder)
     with pytest.raises(BadResults, match="no such folder"):
         read_results(folder / "none")

@@ -14,6 +14,7 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from fras_cli.app import app
+from fras_common.files import write_whole
 from fras_experiments.results import paper
 from fras_experiments.results.beside_paper import beside_paper
 from fras_experiments.results.command import write_report
@@ -29,7 +30,6 @@ from fras_experiments.results.limits import pull_ends
 from fras_experiments.results.planning import paper_growth, planning_of
 from fras_experiments.results.reading import Results, read_results
 from fras_experiments.results.summary import summary_lines
-from fras_experiments.results.writing import write_whole
 from support.campaigns import drawn_campaign, lifted, results_folder
 
 MOST_BYTES = 200_000
@@ -318,7 +318,7 @@ def test_the_commands_write_print_and_refuse(folder: Path, tmp_path: Path):
     for asked, why in (
         ([*both, "--where", "planner.ignore_ap"], "is no FIELD=VALUE"),
         ([*both, "--out", str(tmp_path / "c.gif")], "no format 'gif'"),
-        (["experiment", "report", str(tmp_path)], "is no folder of results"),
+        (["experiment", "report", str(tmp_path)], "is no folder that `fras experiment` wrote"),
         (["experiment", "compare", str(tmp_path / "none"), str(folder)], "no such folder"),
     ):
         refused = RUNNER.invoke(app, asked)

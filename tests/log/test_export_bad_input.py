@@ -139,7 +139,7 @@ BAD: list[tuple[Callable[[Path], Path], type[Exception], str]] = [
     (no_ticks, NothingToExport, "holds nothing of its trial to show"),
     (newer, NewerLog, r"written by FRAS 999\.0\.1.*install 999\.0\.1 or newer"),
     (nameless, ForeignLog, "lacks the metadata record `fras` with the trial's name"),
-    (lambda path: path, NoSuchLog, "cannot be read"),
+    (lambda path: path, NoSuchLog, "can't be read"),
 ]
 
 

@@ -13,7 +13,6 @@ from fras_common.bus import RemoteFault
 from fras_common.messages import (
     CancelRequest,
     ExecuteReply,
-    ExecuteRequest,
     FaultRecord,
     Header,
     HoldRequest,
@@ -46,6 +45,7 @@ from fras_motion import service as motion_service
 from fras_motion.kinematics import BASES_IN_WORLD, ArmKinematics
 from fras_motion.service import MotionService
 from support.arms import HOME
+from support.goals import reach_goal
 from support.shells import ShellBench
 
 PSM1, PSM2 = CRTK
@@ -252,15 +252,7 @@ def test_the_next_trial_begins_at_home_wherever_a_client_left_the_arms(client: C
 
 
 def reach(client: Client) -> ExecuteReply:
-    request = ExecuteRequest(
-        trial="t",
-        goal_id="g1",
-        name="reach",
-        arm="psm1",
-        block="b(2,2)",
-        target_m=(0.03, 0.03, 0.005),
-    )
-    return client.answer(EXECUTE, request)
+    return client.answer(EXECUTE, reach_goal())
 
 
 def test_in_a_trial_the_acting_arm_is_busy(client: Client) -> None:

@@ -20,6 +20,7 @@ from fras_common.messages import (
 from fras_common.service import ServiceHost
 from fras_common.topics import CRTK, HOLD, HOLDS, RECORDER_LAST, RESUME
 from fras_motion.service import MotionService
+from support.holding import holders
 from support.shells import ShellBench
 
 TURNS = 200
@@ -65,9 +66,7 @@ class Bench(ShellBench):
         return any(token.startswith("ready/motion") for token in self.tokens)
 
     def held(self) -> dict[str, str]:
-        state: HoldState = self.answer(HOLD, HoldRequest(holder="probe", reason="asks"))
-        self.answer(RESUME, ResumeRequest(holder="probe", by="probe"))
-        return {holder: why for holder, why in state.holds.items() if holder != "probe"}
+        return holders(self)
 
 
 @pytest.fixture

@@ -9,18 +9,17 @@ from fras_common.bus import MemoryBus, MemoryFabric
 from fras_common.messages import (
     CancelRequest,
     HoldRequest,
-    HoldState,
     LastReply,
     RecorderStatus,
     ResetRequest,
-    ResumeRequest,
 )
 from fras_common.scenario import RunSection, Scenario, resolve
 from fras_common.service import ServiceHost
-from fras_common.topics import CANCEL, HOLD, MOTION_RESET, RECORDER_LAST, RECORDER_STATUS, RESUME
+from fras_common.topics import CANCEL, HOLD, MOTION_RESET, RECORDER_LAST, RECORDER_STATUS
 from fras_motion.holds import Holds
 from fras_motion.log_watch import LogWatch
 from fras_motion.service import MotionService
+from support.holding import holders
 from support.shells import ShellBench
 
 
@@ -49,9 +48,7 @@ class Bench(ShellBench):
         return self.held()
 
     def held(self) -> dict[str, str]:
-        state: HoldState = self.answer(HOLD, HoldRequest(holder="probe", reason="asks"))
-        self.answer(RESUME, ResumeRequest(holder="probe", by="probe"))
-        return {holder: why for holder, why in state.holds.items() if holder != "probe"}
+        return holders(self)
 
 
 @pytest.fixture

@@ -10,7 +10,6 @@ from fras_common.messages import (
     ActionResult,
     CancelRequest,
     ExecuteReply,
-    ExecuteRequest,
     HoldRequest,
     HoldState,
     JawState,
@@ -43,6 +42,7 @@ from fras_common.topics import (
 from fras_motion.crtk.link import CrtkLink
 from fras_motion.service import MotionService
 from support.arms import HOME, off
+from support.goals import reach_goal
 from support.shells import ShellBench
 from support.verdicts import verdict
 
@@ -113,15 +113,7 @@ class Bench(ShellBench):
         self.answer(MOTION_RESET, ResetRequest(trial="t", scenario=scenario))
 
     def reach(self) -> ExecuteReply:
-        request = ExecuteRequest(
-            trial="t",
-            goal_id="g1",
-            name="reach",
-            arm="psm1",
-            block="b(2,2)",
-            target_m=(0.03, 0.03, 0.005),
-        )
-        return self.answer(EXECUTE, request)
+        return self.answer(EXECUTE, reach_goal())
 
     def judge(self) -> None:
         """Judge the present tick, and do what is due of the next."""

@@ -10,7 +10,6 @@ from fras_common.bus import MemoryBus, RemoteFault
 from fras_common.messages import (
     CancelRequest,
     ExecuteReply,
-    ExecuteRequest,
     HoldRequest,
     LastReply,
     Presence,
@@ -34,6 +33,7 @@ from fras_common.topics import (
 from fras_motion import page_watch
 from fras_motion.page_watch import PRESENCE_TIMEOUT_S
 from fras_motion.service import MotionService
+from support.goals import reach_goal
 from support.shells import ShellBench
 from support.verdicts import verdict
 
@@ -73,11 +73,7 @@ class Bench(ShellBench):
         self.settle()
 
     def reach(self) -> ExecuteReply:
-        goal = ExecuteRequest(
-            trial="t", goal_id="g1", name="reach", arm="psm1", block="b(2,2)",
-            target_m=(0.02, 0.03, 0.005),
-        )  # fmt: skip
-        return self.answer(EXECUTE, goal)
+        return self.answer(EXECUTE, reach_goal((0.02, 0.03, 0.005)))
 
     def tick(self) -> None:
         self._verdicts.put(verdict(self.states[-1].tick, "t", "ok"))

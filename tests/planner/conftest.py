@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fras_planner.knowledge import load_knowledge
-from fras_planner.planning import Knowledge, PlanningScene
+from fras_planner.planning import Knowledge, Planner, PlanningScene
 
 LENGTH_M = (0.1, 0.12)
 
@@ -53,3 +53,14 @@ def four_blocks() -> PlanningScene:
     statics += ["reachable(psm1,b(1,1))", "reachable(psm1,b(2,1))"]
     statics += ["reachable(psm2,b(1,2))", "reachable(psm2,b(2,2))"]
     return PlanningScene.make(names, blocks, (0.01, 0.04, -0.001), statics)
+
+
+@pytest.fixture(scope="module")
+def scene(four_blocks: PlanningScene) -> PlanningScene:
+    """What a module plans in; one that needs another scene has its own fixture of this name."""
+    return four_blocks
+
+
+@pytest.fixture(scope="module")
+def planner(knowledge: Knowledge, scene: PlanningScene) -> Planner:
+    return Planner(knowledge, scene, "weighted")

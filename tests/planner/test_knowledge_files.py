@@ -114,7 +114,7 @@ def test_knowledge_without_criteria_is_refused(copy: Path) -> None:
 
 def test_text_that_is_no_text_is_named(copy: Path) -> None:
     (copy / "goal.lp").write_bytes(b"\xff\xfe")
-    with pytest.raises(KnowledgeFault, match="cannot be read"):
+    with pytest.raises(KnowledgeFault, match="can't be read"):
         load_knowledge(copy)
 
 

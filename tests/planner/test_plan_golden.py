@@ -25,11 +25,6 @@ def scene(make_scene: SceneMaker) -> PlanningScene:
     )
 
 
-@pytest.fixture(scope="module")
-def planner(knowledge: Knowledge, scene: PlanningScene) -> Planner:
-    return Planner(knowledge, scene, "weighted")
-
-
 def texts(plan: Plan) -> list[str]:
     return [action.text for action in plan.actions]
 

@@ -10,16 +10,6 @@ from fras_planner.planning import Knowledge, Planner, PlanningScene
 SceneMaker = Callable[..., PlanningScene]
 
 
-@pytest.fixture(scope="module")
-def scene(four_blocks: PlanningScene) -> PlanningScene:
-    return four_blocks
-
-
-@pytest.fixture(scope="module")
-def planner(knowledge: Knowledge, scene: PlanningScene) -> Planner:
-    return Planner(knowledge, scene, "weighted")
-
-
 def bare(scene: PlanningScene, *statics: str) -> PlanningScene:
     return PlanningScene.make(scene.names, scene.blocks_m, scene.roi_m, statics)
 

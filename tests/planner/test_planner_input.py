@@ -28,11 +28,6 @@ def scene(make_scene: SceneMaker) -> PlanningScene:
     return make_scene(3, 0, fixed=["b(1,1)"])
 
 
-@pytest.fixture(scope="module")
-def planner(knowledge: Knowledge, scene: PlanningScene) -> Planner:
-    return Planner(knowledge, scene)
-
-
 def context(scene: PlanningScene, *fluents: str) -> Context:
     return Context(scene.names, scene.blocks_m, scene.roi_m, fluents)
 

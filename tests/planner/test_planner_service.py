@@ -71,7 +71,8 @@ def bench() -> Iterator[Bench]:
 
 def test_start_needs_a_resolved_scenario(bench: Bench) -> None:
     (none,) = bench.task()
-    assert (none.accepted, none.reason) == (False, "start needs a resolved scenario")
+    assert not none.accepted
+    assert none.reason == "no resolved scenario came with the start: resolve it first"
     (unresolved,) = bench.task(scenario=Scenario())
     assert not unresolved.accepted
     assert bench.statuses == []
@@ -115,7 +116,7 @@ def test_one_trial_at_a_time_and_abort_names_its_trial(bench: Bench) -> None:
     bench.client.serve(RECORDER_OPEN, answers.append)  # never answered: the trial stays begun
     first = bench.task(scenario=SCENARIO)
     second = bench.task(scenario=SCENARIO, trial="t2")
-    assert second[0].reason == "trial t is under way"
+    assert second[0].reason == "trial 't' is under way: let it end first"
     (wrong,) = bench.task(command="abort", trial="t2")
     assert not wrong.accepted
     (right,) = bench.task(command="abort", trial="t", reason="surgeon said so")

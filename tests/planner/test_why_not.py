@@ -20,16 +20,6 @@ HELD = ["in_hand(psm1,b(2,1))", "closed_gripper(psm1)"]
 AT_LIMIT = [*HELD, "max_height(psm1)"]
 
 
-@pytest.fixture(scope="module")
-def scene(four_blocks: PlanningScene) -> PlanningScene:
-    return four_blocks
-
-
-@pytest.fixture(scope="module")
-def planner(knowledge: Knowledge, scene: PlanningScene) -> Planner:
-    return Planner(knowledge, scene, "weighted")
-
-
 ATTACHED = (
     "b(1,1) lies over an attachment point. Tissue over an attachment point is not grasped.",
 )

@@ -30,6 +30,15 @@ def finish(stage: Stage, last_tick: int) -> None:
     stage.ask_close(last_tick, status.seq).wait()
 
 
+def go_on(second: Stage, folder: Path, last_tick: int) -> None:
+    """Have the next recorder open the log anew and close it."""
+    try:
+        second.open(folder)
+        finish(second, last_tick)
+    finally:
+        second.end()
+
+
 def test_nothing_is_lost_that_a_publisher_still_caches(stage: Stage, tmp_path: Path):
     stage.open(tmp_path)
     for tick in range(5):
@@ -60,12 +69,7 @@ def test_what_was_not_flushed_is_written_again(stage: Stage, tmp_path: Path):
     for tick in range(5):
         stage.tick(tick)
     # At once: what waits in the first file's chunk goes with it.
-    second = stage.kill()
-    try:
-        second.open(tmp_path)
-        finish(second, 4)
-    finally:
-        second.end()
+    go_on(stage.kill(), tmp_path, 4)
     assert ticks(tmp_path / "audit.mcap") == list(range(5))
 
 
@@ -73,12 +77,7 @@ def test_other_trials_in_the_caches_stay_out(stage: Stage, tmp_path: Path):
     stage.tick(7, trial="t-0")
     stage.open(tmp_path)
     stage.tick(0)
-    second = stage.kill()
-    try:
-        second.open(tmp_path)
-        finish(second, 0)
-    finally:
-        second.end()
+    go_on(stage.kill(), tmp_path, 0)
     trials = {
         decode(RobotState, one.payload, one.key).trial
         for one in LogReader(tmp_path / "audit.mcap").messages()
@@ -94,12 +93,7 @@ def test_so_do_those_whose_clock_was_ahead_then(stage: Stage, tmp_path: Path):
     stage.open(tmp_path)
     stage.tick(0)
     stage.settle()
-    second = stage.kill()
-    try:
-        second.open(tmp_path)
-        finish(second, 0)
-    finally:
-        second.end()
+    go_on(stage.kill(), tmp_path, 0)
     assert ticks(tmp_path / "audit.mcap") == [0]
 
 

@@ -199,7 +199,7 @@ def test_an_open_that_fails_does_not_cost_the_log_that_is_open(stage: Stage, tmp
     stage.open(tmp_path / "1")
     stage.tick(0)
     (tmp_path / "file").write_text("in the way", encoding="utf-8")
-    with pytest.raises(RemoteFault, match="cannot write"):
+    with pytest.raises(RemoteFault, match="can't write"):
         stage.open(tmp_path / "file", trial="t-2")
     stage.tick(1)
     status = stage.task()
@@ -227,7 +227,7 @@ def test_a_log_is_never_written_over(stage: Stage, tmp_path: Path):
 
 def test_a_directory_that_cannot_be_made_is_refused(stage: Stage, tmp_path: Path):
     (tmp_path / "file").write_text("in the way", encoding="utf-8")
-    with pytest.raises(RemoteFault, match="cannot write"):
+    with pytest.raises(RemoteFault, match="can't write"):
         stage.open(tmp_path / "file")
 
 

@@ -21,6 +21,12 @@ def nothing(*_: Any) -> None:
     pass
 
 
+def written(path: Path) -> list[int]:
+    """Numbers of the messages that a log holds."""
+    headers = (read_header(one.payload) for one in LogReader(path).messages())
+    return [header.seq for header in headers if header is not None]
+
+
 def test_a_mistake_on_the_writing_thread_is_raised_on_the_loop(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
@@ -90,8 +96,7 @@ def test_so_is_one_from_a_cache(tmp_path: Path, trial: str, kept: list[int]):
     writing.close("closed", facts.append)
     while not facts:
         posted.get(timeout=30.0)()
-    written = [read_header(one.payload) for one in LogReader(tmp_path / "audit.mcap").messages()]
-    assert [header.seq for header in written if header is not None] == kept
+    assert written(tmp_path / "audit.mcap") == kept
     writing.end()
 
 
@@ -114,6 +119,5 @@ def test_an_early_sample_of_another_trial_is_known_by_its_number(
     writing.close("closed", facts.append)
     while not facts:
         posted.get(timeout=30.0)()
-    written = [read_header(one.payload) for one in LogReader(tmp_path / "audit.mcap").messages()]
-    assert [header.seq for header in written if header is not None] == kept
+    assert written(tmp_path / "audit.mcap") == kept
     writing.end()

@@ -160,13 +160,19 @@ def test_supports_balance_and_the_rest_is_free_of_force(kind):
         np.testing.assert_allclose(result.displacement_m[node], u, atol=1e-15)
 
 
-def boundary_work(kind, n):
-    """Sum of f . u over the boundary of a cube whose whole boundary is bent smoothly."""
+def cube(kind, n):
+    """Mesh of a cube with n cells along each edge, or what they are split into."""
     mesh = box_mesh((0.02, 0.02, 0.02), (n + 1, n + 1, n + 1))
     if kind.startswith("tet"):
         mesh = split_into_tetrahedra(mesh)
     if kind == "tet10":
         mesh = with_midside_nodes(mesh)
+    return mesh
+
+
+def boundary_work(kind, n):
+    """Sum of f . u over the boundary of a cube whose whole boundary is bent smoothly."""
+    mesh = cube(kind, n)
     x, y, z = mesh.nodes_m.T
     u = np.stack([8 * y * z, 3e-3 * np.sin(60 * x), 6 * x * y], axis=1)
     result = solve_static(
@@ -204,11 +210,7 @@ def harmonic(x):
 
 def distance_from_exact(kind, n):
     """Largest error of a node inside a cube whose surface is displaced as in `harmonic`."""
-    mesh = box_mesh((0.02, 0.02, 0.02), (n + 1, n + 1, n + 1))
-    if kind.startswith("tet"):
-        mesh = split_into_tetrahedra(mesh)
-    if kind == "tet10":
-        mesh = with_midside_nodes(mesh)
+    mesh = cube(kind, n)
     exact = harmonic(mesh.nodes_m)
     outside = np.flatnonzero(np.abs(mesh.nodes_m - 0.01).max(axis=1) > 0.01 - 1e-9)
     result = solve_static(

@@ -210,7 +210,7 @@ def test_a_mesh_that_may_not_be_read_is_named(
         raise PermissionError(13, "Permission denied", str(path))
 
     monkeypatch.setattr(Path, "read_bytes", refuse)
-    assert "cannot be read: [Errno 13]" in refused(scenario_file(GOOD))["allowed"]
+    assert "can't be read: [Errno 13]" in refused(scenario_file(GOOD))["allowed"]
 
 
 # --- the simulator's side -------------------------------------------------------------------

@@ -12,17 +12,16 @@ from mcap.reader import make_reader
 from fras_common.bus import RawSample
 from fras_common.codec import encode
 from fras_common.messages import (
-    Array,
     Header,
     LogRecord,
     RobotState,
-    SolverReport,
     TissueState,
     Verdict,
 )
 from fras_log import AuditLog, LogFile, Signer, Verification
 from support import verdicts
 from support.forger import ChunkPiece, chunks, take_apart
+from support.tissues import let_alone
 
 Verify = Callable[[bytes], Verification]
 """Verifies bytes as a file of a log whose signer is known."""
@@ -59,22 +58,7 @@ def robot(tick: int) -> RobotState:
 
 def tissue(tick: int, nodes: int = 16) -> TissueState:
     places = np.random.default_rng(tick).normal(size=(nodes, 3))
-    return TissueState(
-        tick=tick,
-        nodes_m=Array.of(places, "<f4"),
-        nodal_force_n=Array.of(places * 0.01, "<f4"),
-        max_force_n=0.01 * tick,
-        max_node_speed_m_s=0.0,
-        tool_force_n={},
-        grasped={},
-        grasped_force_n={},
-        patch_force_n=Array.of(np.zeros((1, 3)), "<f4"),
-        balance_residual_n=0.0,
-        solver=SolverReport(
-            iterations=2, residual=1e-9, refactored=False, wall_s=0.002, converged=True,
-            inverted_elements=0,
-        ),
-    )  # fmt: skip
+    return let_alone(tick, places, places * 0.01, max_force_n=0.01 * tick)
 
 
 class Recording:

@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fras_common.messages import Array, SolverReport, TissueModel, TissueState
 
@@ -40,6 +41,27 @@ def tissue(tick: int, force_n: float = 0.0, converged: bool = True, **header: An
         ),
         **fields,
     )
+
+
+def let_alone(
+    tick: int, nodes_m: NDArray[np.float64], force_n: NDArray[np.float64], **fields: Any
+) -> TissueState:
+    """Tissue of whatever shape that no arm holds, as it stands in a log made by hand."""
+    return TissueState(
+        tick=tick,
+        nodes_m=Array.of(nodes_m, "<f4"),
+        nodal_force_n=Array.of(force_n, "<f4"),
+        max_node_speed_m_s=0.0,
+        tool_force_n={},
+        grasped_force_n={},
+        patch_force_n=Array.of(np.zeros((1, 3)), "<f4"),
+        balance_residual_n=0.0,
+        solver=SolverReport(
+            iterations=2, residual=1e-9, refactored=False, wall_s=0.002, converged=True,
+            inverted_elements=0,
+        ),
+        **{"grasped": {}, **fields},
+    )  # fmt: skip
 
 
 MODEL = TissueModel(

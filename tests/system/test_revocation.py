@@ -101,7 +101,7 @@ def test_every_command_finds_the_keys_and_a_revoked_one_has_no_effect(
         (keys / "cli.key").chmod(0o644)
         refused = fras("status")
         assert refused.end() == 2
-        assert "others may use this key: chmod 600" in refused.text
+        assert "others may use this key: `chmod 600" in refused.text
         (keys / "cli.key").chmod(0o600)
         assert fras("resume", "--holder", "thief").end() == 0
         # In mid-trial, which waits for who has stopped it; our own certificate is revoked, too.

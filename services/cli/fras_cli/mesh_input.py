@@ -60,7 +60,7 @@ def read_mesh_file(scenario: Scenario, file: Path) -> tuple[Scenario, bytes]:
             problem = f"{path} has {size} bytes, at most {MAX_BYTES} are read: coarsen the mesh"
         data = b"" if problem else path.read_bytes()
     except (OSError, ValueError) as error:
-        problem, data = f"{path} cannot be read: {error}", b""
+        problem, data = f"{path} can't be read: {error}", b""
     if problem:
         raise ScenarioError(str(file), "tissue.mesh_file", tissue.mesh_file, problem)
     answer = _ask_simulator(data, path.name, tissue.mesh_scale)

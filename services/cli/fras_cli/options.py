@@ -190,5 +190,5 @@ def write_new_scenario(base: str, seed: int, out: Path | None) -> None:
             file.write(text)
     except OSError as error:
         raise ScenarioError(
-            COMMAND_LINE, "--out", str(out), f"cannot be written: {error}"
+            COMMAND_LINE, "--out", str(out), f"can't be written: {error}"
         ) from error

@@ -163,7 +163,7 @@ class TrialFollower:
             if stop():
                 return False
             if gone := self._stack.watch():
-                raise StackDied(f"in mid-trial: {gone}")
+                raise StackDied(f"the stack broke in mid-trial: {gone}")
 
     def _update(self, **changes: object) -> None:
         with self._changed:

@@ -9,7 +9,9 @@ class FrasError(Exception):
     Parameters
     ----------
     text : str
-        What was wrong, where, and what to do about it.
+        What was wrong with which value, where, and what to do about it. It goes on after `fras: `
+        or another text, so it begins without a capital and ends without a full stop. Commands
+        stand in backquotes; what can't be done "can't" be done.
     **values
         The numbers and names behind the text; they become attributes, so that a shell can
         publish them and a test can read them without parsing prose.

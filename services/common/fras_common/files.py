@@ -1,7 +1,8 @@
-"""Files from elsewhere, read no further than they may be long."""
+"""Files: read no further than they may be long, written whole or not at all; whose they are."""
 
 import errno
 import os
+import stat
 from pathlib import Path
 from typing import Final
 
@@ -25,3 +26,37 @@ def read_at_most(path: Path, most_bytes: int) -> bytes:
         text = f"{os.strerror(errno.EFBIG)}: more than {most_bytes} bytes"
         raise OSError(errno.EFBIG, text, str(path))
     return content
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write beside, then put in place: what stood there stays if it fails or is killed.
+
+    Raises
+    ------
+    OSError
+        It can't be written, as on a full disk.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    beside = path.with_name(f".{path.name}.{os.getpid()}.new")
+    try:
+        beside.write_bytes(content)
+        beside.replace(path)
+    finally:
+        beside.unlink(missing_ok=True)
+
+
+def data_folder() -> Path:
+    """Return where this user's data are: `$XDG_DATA_HOME/fras`, or below `~/.local/share`.
+
+    Raises
+    ------
+    RuntimeError
+        Neither is known, as for a user whom no system knows.
+    """
+    base = os.environ.get("XDG_DATA_HOME")
+    return (Path(base) if base else Path.home() / ".local" / "share") / "fras"
+
+
+def is_private(path: Path) -> bool:
+    """Whether nobody but its owner may use a file, or look into a folder."""
+    return not path.stat().st_mode & (stat.S_IRWXG | stat.S_IRWXO)

@@ -5,14 +5,13 @@ They are made by `fras keys` and named after the service; a process needs three 
 
 import os
 import re
-import stat
 from dataclasses import dataclass
 from pathlib import Path
 
 import msgspec
 
 from fras_common.errors import FrasError
-from fras_common.files import read_at_most
+from fras_common.files import data_folder, is_private, read_at_most
 
 AUTHORITY = "ca"
 CERTIFICATE, KEY = ".pem", ".key"
@@ -52,12 +51,10 @@ def default_keys_dir() -> Path:
     """
     if given := os.environ.get("FRAS_KEYS"):
         return Path(given)
-    base = os.environ.get("XDG_DATA_HOME")
     try:
-        data = Path(base) if base else Path.home() / ".local" / "share"
+        return data_folder() / "keys"
     except RuntimeError as error:
         raise BadIdentity("there is no home directory for keys: set FRAS_KEYS") from error
-    return data / "fras" / "keys"
 
 
 def identity_in(folder: Path, name: str) -> Identity:
@@ -123,8 +120,8 @@ def require_private(path: Path) -> None:
     ------
     BadIdentity
     """
-    if path.stat().st_mode & (stat.S_IRWXG | stat.S_IRWXO):
-        raise BadIdentity(f"{path}: others may use this key: chmod 600 {path}", path=path)
+    if not is_private(path):
+        raise BadIdentity(f"{path}: others may use this key: `chmod 600 {path}`", path=path)
 
 
 def require_tls(endpoint: str, identity: Identity | None) -> None:

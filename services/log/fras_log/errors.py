@@ -10,7 +10,7 @@ class NoSuchLog(FrasError):
 
     def __init__(self, path: Path, problem: str) -> None:
         super().__init__(
-            f"{path}: cannot be read: {problem}; give the audit.mcap of a run",
+            f"{path}: can't be read: {problem}; give the audit.mcap of a run",
             path=path,
             problem=problem,
         )

@@ -124,7 +124,7 @@ class Desk:
         def on_done(answer: HoldState | FrasError) -> None:
             what = hold_in_words(holder)
             if isinstance(answer, FrasError):
-                self._tell(f"Not lifted: {what}: {plain(str(answer))}", good=False)
+                self._tell(sentence(f"Not lifted: {what}: {plain(str(answer))}"), good=False)
                 return
             if holder == HOLDER:
                 self._stopper.clear()
@@ -135,9 +135,9 @@ class Desk:
     def _on_decision(self, what: str) -> Callable[[DecisionReply | FrasError], None]:
         def on_done(answer: DecisionReply | FrasError) -> None:
             if isinstance(answer, FrasError):
-                self._tell(f"Not {what}: {plain(str(answer))}", good=False)
+                self._tell(sentence(f"Not {what}: {plain(str(answer))}"), good=False)
             elif not answer.accepted:
-                self._tell(f"Not {what}: {plain(answer.text)}", good=False)
+                self._tell(sentence(f"Not {what}: {plain(answer.text)}"), good=False)
             else:
                 left_out = ", ".join(plain(one) for one in answer.excluded)
                 without = f"; from now on without {left_out}" if left_out else ""
@@ -147,12 +147,12 @@ class Desk:
 
     def _on_why_not(self, answer: WhyNotReply | FrasError) -> None:
         if isinstance(answer, FrasError):
-            self._tell(f"The planner has no answer: {plain(str(answer))}", good=False)
+            self._tell(sentence(f"The planner has no answer: {plain(str(answer))}"), good=False)
         else:
             self._note(answer)
 
     def _on_replay(self, answer: ReplayStatus | FrasError) -> None:
         if isinstance(answer, FrasError):
-            self._tell(f"The replay can't do that: {plain(str(answer))}", good=False)
+            self._tell(sentence(f"The replay can't do that: {plain(str(answer))}"), good=False)
         else:
             self._note(answer)

@@ -26,7 +26,7 @@ class InvalidParameter(FrasError):
 
     def __init__(self, name: str, value: object, allowed: str) -> None:
         super().__init__(
-            f"motion parameter {name} = {value!r}; allowed: {allowed}",
+            f"motion parameter {name} = {value!r}; allowed: {allowed}; correct it in the scenario",
             name=name,
             value=value,
             allowed=allowed,

@@ -27,9 +27,9 @@ def startable(
     TaskRefused
     """
     if running is not None:
-        raise TaskRefused(f"trial {running.status.trial} is under way")
+        raise TaskRefused(f"trial {running.status.trial!r} is under way: let it end first")
     if request.scenario is None or request.scenario.scene is None:
-        raise TaskRefused("start needs a resolved scenario")
+        raise TaskRefused("no resolved scenario came with the start: resolve it first")
     if request.scenario.has_patient and not patient_is_here:
         raise TaskRefused(NO_PATIENT)
     return request.scenario
@@ -43,6 +43,7 @@ def require_abortable(request: TaskRequest, running: Executive | None) -> None:
     TaskRefused
     """
     if running is None or running.status.trial != request.trial:
-        raise TaskRefused("no such trial is under way")
+        now = f"{running.status.trial!r} is" if running is not None else "none is"
+        raise TaskRefused(f"trial {request.trial!r} is not under way: {now}")
     if running.ending:
-        raise TaskRefused("the trial is ending already")
+        raise TaskRefused(f"trial {request.trial!r} is ending already")

@@ -49,7 +49,7 @@ def load_knowledge(asp_dir: Path | None = None) -> Knowledge:
         try:
             files[name] = path.read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError) as error:
-            raise KnowledgeFault(str(path), 0, f"cannot be read: {error}") from error
+            raise KnowledgeFault(str(path), 0, f"can't be read: {error}") from error
     return _checked(files, str(folder))
 
 

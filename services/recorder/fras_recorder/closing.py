@@ -93,4 +93,4 @@ class Closing:
         self._log.end("error", str(error), facts)
         pending, self._closing = self._closing, None
         if pending is not None:
-            pending.fail(LogFailed(f"log cannot be written: {error}"))
+            pending.fail(LogFailed(f"the log can't be written: {error}"))

@@ -44,17 +44,17 @@ def log_path(request: OpenRequest, below: Path | None = None) -> Path:
     text, folder = request.directory, Path(request.directory)
     if len(text) > DIRECTORY_LENGTH or not text.isprintable():
         problem = f"the directory's name is not printable or longer than {DIRECTORY_LENGTH}"
-        raise LogUnwritable(f"cannot write a log: {problem}", path=text[:DIRECTORY_LENGTH])
+        raise LogUnwritable(f"can't write a log: {problem}", path=text[:DIRECTORY_LENGTH])
     if not folder.is_absolute() or ".." in folder.parts:
         raise LogUnwritable(
-            f"cannot write into {text!r}: give an absolute path without '..'", path=text
+            f"can't write into {text!r}: give an absolute path without '..'", path=text
         )
     try:
         outside = below is not None and not folder.resolve().is_relative_to(below.resolve())
     except (OSError, RuntimeError) as error:
-        raise LogUnwritable(f"cannot write into {text}: {error}", path=text) from error
+        raise LogUnwritable(f"can't write into {text}: {error}", path=text) from error
     if outside:
-        raise LogUnwritable(f"cannot write into {text}: logs stand below {below} here", path=text)
+        raise LogUnwritable(f"can't write into {text}: logs stand below {below} here", path=text)
     return folder / LOG_NAME
 
 
@@ -69,7 +69,7 @@ def exists(path: Path) -> bool:
     try:
         return path.exists()
     except OSError as error:
-        raise LogUnwritable(f"cannot write {path}: {error}", path=path) from error
+        raise LogUnwritable(f"can't write {path}: {error}", path=path) from error
 
 
 def is_written(path: Path, other: str) -> bool:
@@ -154,7 +154,7 @@ def open_log(
             return Opened(log, Trial(request.trial, log.began_ns), seen, genuine)
         return Opened(AuditLog(path, heading, time.time_ns()), Trial(request.trial), seen)
     except OSError as error:
-        raise LogUnwritable(f"cannot write {path}: {error}", path=path) from error
+        raise LogUnwritable(f"can't write {path}: {error}", path=path) from error
 
 
 def _heading(request: OpenRequest, signer: Signer | None) -> LogHeading:

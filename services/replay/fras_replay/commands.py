@@ -88,7 +88,7 @@ def _mark(told: ReplayControl, recording: Recording, player: Player, now_ns: int
         case _:
             number = int(told.value)
     if not 0 <= number < len(recording.marks):
-        raise NoSuchMark(
-            f"there is no such mark; the log has {len(recording.marks)}", number=number
-        )
+        marks = len(recording.marks)
+        there = f"its marks are 0 to {marks - 1}" if marks else "it has none"
+        raise NoSuchMark(f"the log has no mark {number}: {there}", number=number)
     return number

@@ -33,7 +33,11 @@ class OtherTrial(FrasError):
     """A question about another trial than the one that is watched."""
 
     def __init__(self, asked: str, watched: str) -> None:
-        super().__init__(f"asked about trial {asked!r}, watching {watched!r}: reset first")
+        super().__init__(
+            f"asked about trial {asked!r}, watching {watched!r}: reset first",
+            asked=asked,
+            watched=watched,
+        )
 
 
 class LostMoment(FrasError):

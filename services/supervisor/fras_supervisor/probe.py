@@ -41,17 +41,18 @@ def main(argv: list[str] | None = None) -> int:
             identity=identity,
         )
     except (NoRouter, BadIdentity, BadEndpoint) as error:
-        print(error, file=sys.stderr)
+        print(f"{parser.prog}: {error}", file=sys.stderr)
         return 1
     try:
         tokens = {token.rpartition("/")[0] for token in bus.tokens(TIMEOUT_S)}
     except NoAnswer as error:
-        print(error, file=sys.stderr)
+        print(f"{parser.prog}: {error}", file=sys.stderr)
         return 1
     finally:
         bus.close()
     if options.token and options.token not in tokens:
-        print(f"{options.token} is not there; there are {sorted(tokens)}", file=sys.stderr)
+        there = ", ".join(sorted(tokens)) or "none"
+        print(f"{parser.prog}: no token {options.token}; there are {there}", file=sys.stderr)
         return 1
     return 0
 

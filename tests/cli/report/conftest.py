@@ -29,7 +29,6 @@ from fras_common.messages import (
     Pose,
     RobotState,
     RpcRecord,
-    SolverReport,
     TaskReply,
     TaskRequest,
     TaskStatus,
@@ -41,6 +40,7 @@ from fras_common.messages.motion import ActionOutcome
 from fras_common.scenario import Scenario, TissueSection, attachment_raster, resolve, to_toml
 from fras_common.scenario.geometry import nodes_in_discs
 from fras_log import LogFile
+from support.tissues import let_alone
 
 TRIAL = "t-7"
 START_NS = 1_760_000_000_000_000_000
@@ -185,22 +185,8 @@ def tissue(tick: int) -> TissueState:
     steep = np.abs(np.gradient(bump)) + bump**6
     force = np.zeros_like(nodes)
     force[:, 2] = force_n(tick) * steep / steep.max()
-    return TissueState(
-        tick=tick,
-        nodes_m=Array.of(moved, "<f4"),
-        nodal_force_n=Array.of(force, "<f4"),
-        max_force_n=force_n(tick),
-        max_node_speed_m_s=0.0,
-        tool_force_n={},
-        grasped={"psm1": [1]} if tick > 22 else {},
-        grasped_force_n={},
-        patch_force_n=Array.of(np.zeros((1, 3)), "<f4"),
-        balance_residual_n=0.0,
-        solver=SolverReport(
-            iterations=2, residual=1e-9, refactored=False, wall_s=0.002, converged=True,
-            inverted_elements=0,
-        ),
-    )  # fmt: skip
+    grasped = {"psm1": [1]} if tick > 22 else {}
+    return let_alone(tick, moved, force, max_force_n=force_n(tick), grasped=grasped)
 
 
 def robot(tick: int) -> RobotState:

@@ -110,7 +110,9 @@ def export(
     ] = None,
     also: Annotated[
         list[str] | None,
-        typer.Option("--with", help="One more, as cli for `fras status` there; may be repeated."),
+        typer.Option(
+            "--with", help="One more, as cli for `fras status` there; may be given again."
+        ),
     ] = None,
     folder: Folder = None,
 ) -> None:

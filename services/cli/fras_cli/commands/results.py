@@ -12,7 +12,7 @@ results_app = typer.Typer()
 Where = Annotated[
     list[str] | None,
     typer.Option(
-        help="Only trials at this point of the sweep; may be repeated.", metavar="FIELD=VALUE"
+        help="Only trials at this point of the sweep; may be given again.", metavar="FIELD=VALUE"
     ),
 ]
 Seed = Annotated[int, typer.Option(min=0, help="Of the bootstraps.")]

@@ -188,7 +188,7 @@ def plan(
     why_not: Annotated[
         list[str] | None,
         typer.Option(
-            help="Why not this block, or this action first? May be given more than once.",
+            help="Why not this block, or this action first? May be given again.",
             metavar="'b(3,4)' or 'pull(psm1,b(3,4))'",
         ),
     ] = None,

@@ -16,6 +16,7 @@ from cryptography.x509.oid import NameOID
 from fras_cli.keys.authority import ROUTER, Pair, hosts_named
 from fras_common.access import LINK, PARTICIPANTS
 from fras_common.errors import FrasError
+from fras_common.files import is_private
 from fras_common.identity import (
     AUTHORITY,
     CERTIFICATE,
@@ -206,8 +207,8 @@ def put_pairs(folder: Path, made: Mapping[str, Pair]) -> None:
     """
     try:
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-        if folder.stat().st_mode & 0o077:
-            raise BadKeys(f"{folder}: others may look into it: chmod 700 {folder}", path=folder)
+        if not is_private(folder):
+            raise BadKeys(f"{folder}: others may look into it: `chmod 700 {folder}`", path=folder)
         for name, pair in made.items():
             if pair.key:
                 _put(key_path(folder, name), pair.key)

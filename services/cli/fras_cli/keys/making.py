@@ -180,7 +180,7 @@ def export_keys(folder: Path, names: Sequence[str], out: Path, now: datetime) ->
 def _require_here(folder: Path, name: str, there: Sequence[str]) -> None:
     if name not in there:
         path = certificate_path(folder, name)
-        raise BadKeys(f"{path}: there is none; there are {', '.join(there)}", path=path)
+        raise BadKeys(f"{path}: no such certificate; there are {', '.join(there)}", path=path)
 
 
 def _next(name: str, said: Mapping[str, str]) -> str:

@@ -33,6 +33,7 @@ from fras_common.messages import (
 )
 from fras_common.scenario import Scenario
 from fras_log.reader import RawMessage
+from fras_log.sound import require_forces, require_surface
 
 T = TypeVar("T")
 
@@ -166,10 +167,7 @@ class Gathering:
             self._started_ns = request.started_ns
 
     def _on_model(self, model: TissueModel) -> None:
-        surface, n_nodes = model.surface.ints(), len(model.nodes_m.view())
-        if surface.size and not 0 <= surface.min() <= surface.max() < n_nodes:
-            problem = f"names a node outside 0..{n_nodes - 1}"
-            raise MalformedMessage(topics.TISSUE_MODEL.key, "$.surface", problem)
+        require_surface(model)
         self._model = model
 
     def _on_robot(self, state: RobotState) -> None:
@@ -188,9 +186,7 @@ class Gathering:
         )
 
     def _on_tissue(self, state: TissueState) -> None:
-        if state.nodal_force_n.shape != state.nodes_m.shape:
-            problem = f"{state.nodal_force_n.shape[0]} for {state.nodes_m.shape[0]} nodes"
-            raise MalformedMessage(topics.TISSUE_STATE.key, "$.nodal_force_n", problem)
+        require_forces(state)
         top_m = float(state.nodes_m.floats()[:, 2].max(initial=-math.inf))
         views = self._views or TissueViews(first=state, highest=state, last=state)
         if top_m > self._top_m:

@@ -1,11 +1,11 @@
 """The files that come from a log: `summary.json`, `report.html`, and a picture."""
 
-import os
 from pathlib import Path
 
 from fras_cli.report.reading import read_trial
 from fras_cli.report.story import tell
 from fras_cli.report.summary import Summary, summarise, to_json
+from fras_common.files import write_whole
 
 
 def write_report(log: Path, out_dir: Path) -> Summary:
@@ -23,9 +23,8 @@ def write_report(log: Path, out_dir: Path) -> Summary:
     trial = read_trial(log)
     summary = summarise(trial)
     page = render_page(trial, summary)
-    out_dir.mkdir(parents=True, exist_ok=True)
-    _write(out_dir / "summary.json", to_json(summary))
-    _write(out_dir / "report.html", page.encode())
+    write_whole(out_dir / "summary.json", to_json(summary))
+    write_whole(out_dir / "report.html", page.encode())
     return summary
 
 
@@ -41,15 +40,4 @@ def write_picture(log: Path, path: Path) -> None:
 
     trial = read_trial(log)
     figure = picture_figure(trial, tell(trial))
-    path.parent.mkdir(parents=True, exist_ok=True)
-    _write(path, to_png(figure, PICTURE_DPI))
-
-
-def _write(path: Path, data: bytes) -> None:
-    """Write at once: readers see the old file or the whole new one."""
-    part = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        part.write_bytes(data)
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
+    write_whole(path, to_png(figure, PICTURE_DPI))

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 from fras_common.bus.contract import BusClosed, Call, OnMalformed, RawSample, RemoteFault
-from fras_common.bus.shared import Answer, Kept, Stamper, received, wait_for
+from fras_common.bus.shared import Answer, Kept, Stamper, decoding, wait_for
 from fras_common.codec import MalformedMessage, decode, encode
 from fras_common.errors import FrasError
 from fras_common.keeping import kept_of
@@ -99,15 +99,7 @@ class MemoryBus:
 
     def subscribe(self, topic: Topic[M], callback: Callable[[M], None]) -> None:
         """Receive every message of a key or family."""
-
-        def deliver(sample: RawSample) -> None:
-            try:
-                message = received(topic, sample.payload, sample.key)
-            except MalformedMessage as error:
-                self._on_malformed(error)
-            else:
-                callback(message)
-
+        deliver = decoding(topic, callback, self._on_malformed)
         self._subscribe(topic.wildcard, deliver, history=1 if topic.qos is Qos.EVENT else 0)
 
     def recent(self, topic: Topic[M], at_most: int) -> Kept[M]:

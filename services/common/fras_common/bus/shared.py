@@ -55,6 +55,22 @@ def received(topic: Topic[M], payload: bytes, key: str) -> M:
     return message
 
 
+def decoding(
+    topic: Topic[M], callback: Callable[[M], None], on_malformed: OnMalformed
+) -> Callable[[RawSample], None]:
+    """Return what takes the samples of `topic` and passes their messages to `callback`."""
+
+    def deliver(sample: RawSample) -> None:
+        try:
+            message = received(topic, sample.payload, sample.key)
+        except MalformedMessage as error:
+            on_malformed(error)
+        else:
+            callback(message)
+
+    return deliver
+
+
 class Kept(Generic[M]):
     """Decodes what came on a key, once it is looked at.
 

@@ -29,7 +29,7 @@ from fras_common.bus.hearing import Asker, Hearing
 from fras_common.bus.past import CACHES, Beat, Cached, Past
 from fras_common.bus.recovery import ALL_OF_WHO_BEGINS, Earlier
 from fras_common.bus.settings import NoRouter, client_settings
-from fras_common.bus.shared import Answer, Kept, Stamper, received, wait_for
+from fras_common.bus.shared import Answer, Kept, Stamper, decoding, wait_for
 from fras_common.bus.zenoh_wire import ENCODING, ZenohCall, beat, configured, numbered, outcome, raw
 from fras_common.codec import MalformedMessage, decode, encode
 from fras_common.errors import FrasError
@@ -153,15 +153,7 @@ class ZenohBus:
 
     def subscribe(self, topic: Topic[M], callback: Callable[[M], None]) -> None:
         """Receive every message of a key or family."""
-
-        def deliver(sample: RawSample) -> None:
-            try:
-                message = received(topic, sample.payload, sample.key)
-            except MalformedMessage as error:
-                self._on_malformed(error)
-            else:
-                callback(message)
-
+        deliver = decoding(topic, callback, self._on_malformed)
         if (earlier := EARLIER.get(topic.qos)) is not None:
             self._hear(topic.wildcard, deliver, earlier)
             return

@@ -42,7 +42,7 @@ def route(
         session = zenoh.open(configured(router_settings(listen, identity, access, connect)))
     except zenoh.ZError as error:
         asked = ", ".join(listen)
-        raise NoRouter(f"cannot listen on {asked}: {error}", connect=asked) from error
+        raise NoRouter(f"can't listen on {asked}: {error}", connect=asked) from error
     try:
         until()
     finally:

@@ -31,7 +31,7 @@ def load(path: Path) -> Scenario:
     try:
         raw = tomllib.loads(read_at_most(path, TEXT_BYTES).decode())
     except (OSError, UnicodeDecodeError) as error:
-        raise ScenarioError(str(path), "file", str(path), f"cannot be read: {error}") from error
+        raise ScenarioError(str(path), "file", str(path), f"can't be read: {error}") from error
     except (ValueError, RecursionError) as error:
         # tomllib also lets through what int() says of too many digits, and nesting without end.
         raise ScenarioError(str(path), "file", str(path), f"is not TOML: {error}") from error

@@ -104,9 +104,9 @@ class AwarenessSection(Section, frozen=True, kw_only=True):
     Attributes
     ----------
     force_limit_n : float
-        epsilon: a pull stops above it.
+        The soft limit, the paper's epsilon: a pull stops above it.
     hard_limit_n : float or None
-        Every action stops above it; twice epsilon if absent.
+        Every action stops above it; twice the soft limit if absent.
     no_limit : bool
         Switch both limits off.
     visible_fraction : float

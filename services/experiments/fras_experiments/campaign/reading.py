@@ -181,7 +181,8 @@ def prepared(campaign: Campaign, where: str) -> Prepared:
         trials = expand(campaign, base, where)
         return Prepared(campaign, base, b"", trials, digest_of(campaign, trials, b""))
     if MESH in (*campaign.set, *campaign.varied):
-        raise BadCampaign(where, MESH, "...", f"is for the box, and {file} has a mesh_file")
+        given = campaign.set.get(MESH, "varied")
+        raise BadCampaign(where, MESH, given, f"is for the box, and {file} has a mesh_file")
     mesh = mesh_path(base, file).read_bytes() if mesh_path(base, file).is_file() else b""
     trials = expand(campaign, base, where, lambda one: read_mesh_file(one, file)[0])
     return Prepared(campaign, base, mesh, trials, digest_of(campaign, trials, mesh))
@@ -239,7 +240,7 @@ def _toml(path: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(read_at_most(path, TEXT_BYTES).decode())
     except (OSError, UnicodeDecodeError) as error:
-        raise BadCampaign(str(path), "file", str(path), f"cannot be read: {error}") from error
+        raise BadCampaign(str(path), "file", str(path), f"can't be read: {error}") from error
     except (ValueError, RecursionError) as error:
         raise BadCampaign(str(path), "file", str(path), f"is not TOML: {error}") from error
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import msgspec
 
+from fras_common.files import write_whole
 from fras_experiments.chaos.faults import KINDS, Fault, Kind
 from fras_experiments.chaos.invariants import Breach
 
@@ -149,9 +150,7 @@ def percentile(ordered: Sequence[float], share: float) -> float | None:
 
 def save(campaign: Campaign, path: Path) -> None:
     """Write it, whole or not at all."""
-    beside = path.with_name(path.name + ".new")
-    beside.write_bytes(msgspec.json.format(msgspec.json.encode(campaign), indent=2) + b"\n")
-    beside.replace(path)
+    write_whole(path, msgspec.json.format(msgspec.json.encode(campaign), indent=2) + b"\n")
 
 
 def load(path: Path) -> Campaign:

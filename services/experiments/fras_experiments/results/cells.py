@@ -106,7 +106,9 @@ def read_cells(path: Path, needed: Sequence[str]) -> Cells:
             f"{path}: no such file; name the folder that `fras experiment` wrote", path=path
         ) from error
     except UnicodeDecodeError as error:
-        raise BadResults(f"{path}: no UTF-8 text at byte {error.start}", path=path) from error
+        raise BadResults(
+            f"{path}: no UTF-8 text at byte {error.start}; the file was cut or changed", path=path
+        ) from error
     return parse_cells(text, path, needed)
 
 
@@ -141,7 +143,9 @@ def parse_cells(text: str, path: Path, needed: Sequence[str]) -> Cells:
             lines.append(reader.line_num)
     except csv.Error as error:
         raise BadResults(
-            f"{path}, line {reader.line_num}: no CSV: {error}", path=path, line=reader.line_num
+            f"{path}, line {reader.line_num}: no CSV: {error}; the file was cut or changed",
+            path=path,
+            line=reader.line_num,
         ) from error
     if not rows:
         raise BadResults(f"{path}: a header without a row; no trial has ended yet", path=path)
@@ -150,11 +154,17 @@ def parse_cells(text: str, path: Path, needed: Sequence[str]) -> Cells:
 
 def _check_header(names: tuple[str, ...], path: Path, needed: Sequence[str]) -> None:
     if not names:
-        raise BadResults(f"{path}, line 1: empty, not even a header", path=path, line=1)
+        raise BadResults(
+            f"{path}, line 1: empty, not even a header; the file was cut", path=path, line=1
+        )
     missing = [name for name in needed if name not in names]
     if missing:
         raise BadResults(
-            f"{path}, line 1: no column {', '.join(missing)}", path=path, line=1, columns=missing
+            f"{path}, line 1: no column {', '.join(missing)}; it was written by another version, "
+            "or changed",
+            path=path,
+            line=1,
+            columns=missing,
         )
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:

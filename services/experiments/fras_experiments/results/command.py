@@ -8,6 +8,7 @@ from pathlib import Path
 from rich.console import Console
 
 from fras_cli.run import EXIT_BAD_INPUT, EXIT_OK
+from fras_common.files import write_whole
 from fras_experiments.results.comparison import chosen, compare
 from fras_experiments.results.comparison_told import as_plain, comparison_table, footnotes
 from fras_experiments.results.errors import BadResults
@@ -17,7 +18,6 @@ from fras_experiments.results.figures.style import FORMATS, save
 from fras_experiments.results.reading import read_results
 from fras_experiments.results.summary import summary_lines
 from fras_experiments.results.trials import Trials
-from fras_experiments.results.writing import write_whole
 
 SUMMARY = "summary.md"
 FOLDER = "figures"

@@ -9,8 +9,6 @@ from typing import Final
 
 BLOCKS: Final = 7
 """N of the N x N candidate grasping points, section IV-A."""
-FORCE_LIMIT_N: Final = 0.5
-"""Epsilon, section IV-A [N]."""
 SIMULATIONS: Final = 100
 """Of scenarios A and B together, again of C, and again without limit; section IV-A."""
 

@@ -123,7 +123,9 @@ def read_results(folder: Path) -> Results:
         A file can't be read.
     """
     if not folder.is_dir():
-        raise BadResults(f"{folder}: no such folder", path=folder)
+        raise BadResults(
+            f"{folder}: no such folder; name the one that `fras experiment` wrote", path=folder
+        )
     about = _toml(folder / CAMPAIGN)
     every = trials_of(read_cells(folder / TRIALS, NEEDED))
     trials, timing = every.where(~every.lost), folder / TIMING
@@ -148,10 +150,13 @@ def _toml(path: Path) -> dict[str, Any]:
         return tomllib.loads(read_at_most(path, TEXT_BYTES).decode())
     except FileNotFoundError as error:
         raise BadResults(
-            f"{path}: no such file; {path.parent} is no folder of results", path=path
+            f"{path}: no such file; {path.parent} is no folder that `fras experiment` wrote",
+            path=path,
         ) from error
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise BadResults(f"{path}: no TOML: {error}", path=path) from error
+        raise BadResults(
+            f"{path}: no TOML: {error}; the file was cut or changed", path=path
+        ) from error
 
 
 def _at(table: object, path: str) -> object:

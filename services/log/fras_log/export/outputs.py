@@ -36,7 +36,7 @@ class OutputUnwritable(FrasError):
     """A file can't be written to its end."""
 
     def __init__(self, problem: str) -> None:
-        super().__init__(f"the export cannot be written: {problem}", problem=problem)
+        super().__init__(f"the export can't be written: {problem}", problem=problem)
 
 
 class NothingToExport(FrasError):

@@ -19,7 +19,7 @@ from fras_common.messages import (
     Verdict,
 )
 from fras_common.scenario import Scenario
-from fras_common.topics import CONTEXT, PATIENT, TISSUE_MODEL, TISSUE_STATE, topic_of
+from fras_common.topics import CONTEXT, PATIENT, TISSUE_STATE, topic_of
 from fras_log.anchors import Anchors, FloatArray, bind
 from fras_log.export.facts import (
     Arms,
@@ -35,6 +35,7 @@ from fras_log.export.facts import (
 )
 from fras_log.export.instruments import instrument
 from fras_log.reader import RawMessage
+from fras_log.sound import require_forces, require_surface
 
 NOT_A_NUMBER: Final = float("nan")
 _FIXED = re.compile(r"fixed\((b\(\d+,\d+\))\)")
@@ -118,10 +119,8 @@ class Teller:
         return Moment(tick, header.stamp_ns, message.arrival_ns, header.seq)
 
     def _on_model(self, model: TissueModel, moment: Moment) -> Iterator[Fact]:
+        require_surface(model)
         surface, rest_m = model.surface.ints(), model.nodes_m.floats()
-        if surface.size and not 0 <= surface.min() <= surface.max() < len(rest_m):
-            problem = f"names a node outside 0..{len(rest_m) - 1}"
-            raise MalformedMessage(TISSUE_MODEL.key, "$.surface", problem)
         limit_n = self._awareness.force_limit_n
         self._stage = Stage(
             moment=moment,
@@ -142,9 +141,7 @@ class Teller:
         if state.nodes_m.shape != self._stage.rest_m.shape:
             problem = f"{len(state.nodes_m.view())} nodes are not those of the tissue's model"
             raise MalformedMessage(TISSUE_STATE.key, "$.nodes_m", problem)
-        if state.nodal_force_n.shape != state.nodes_m.shape:
-            problem = f"{state.nodal_force_n.shape[0]} for {state.nodes_m.shape[0]} nodes"
-            raise MalformedMessage(TISSUE_STATE.key, "$.nodal_force_n", problem)
+        require_forces(state)
         self._nodes_m = state.nodes_m.floats()
         self._solve_ms = (state.tick, 1e3 * state.solver.wall_s)
         holding = (arm for arm, nodes in state.grasped.items() if nodes)

@@ -6,7 +6,6 @@
 import contextlib
 import hashlib
 import os
-import stat
 import tempfile
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -24,8 +23,10 @@ from cryptography.hazmat.primitives.serialization import (
 )
 
 from fras_common.errors import FrasError
+from fras_common.files import data_folder, is_private
 
 PUBLIC_SUFFIX = ".pub"
+WHICH_PUBLIC = "give the log.pub of the machine that recorded"
 
 
 class BadKey(FrasError):
@@ -83,12 +84,10 @@ def default_key_path() -> Path:
     BadKey
         Neither is known, as for a user whom no system knows.
     """
-    base = os.environ.get("XDG_DATA_HOME")
     try:
-        data = Path(base) if base else Path.home() / ".local" / "share"
+        return data_folder() / "log.key"
     except RuntimeError as error:
         raise BadKey("there is no home directory for the key: set XDG_DATA_HOME") from error
-    return data / "fras" / "log.key"
 
 
 def load_or_make(path: Path) -> Signer:
@@ -103,13 +102,18 @@ def load_or_make(path: Path) -> Signer:
         if not path.exists():
             _make(path)
         # Whoever can read it can sign in its name.
-        if path.stat().st_mode & (stat.S_IRWXG | stat.S_IRWXO):
-            raise BadKey(f"{path}: others may use this key; chmod 600 it", path=path)
+        if not is_private(path):
+            raise BadKey(f"{path}: others may use this key: `chmod 600 {path}`", path=path)
         key = load_pem_private_key(path.read_bytes(), password=None)
     except (OSError, ValueError, TypeError, UnsupportedAlgorithm) as error:
-        raise BadKey(f"{path}: no key to sign logs with: {error}", path=path) from error
+        raise BadKey(
+            f"{path}: no key to sign logs with: {error}; where it is moved away, a new one is made",
+            path=path,
+        ) from error
     if not isinstance(key, Ed25519PrivateKey):
-        raise BadKey(f"{path}: is no Ed25519 key", path=path)
+        raise BadKey(
+            f"{path}: is no Ed25519 key; where it is moved away, a new one is made", path=path
+        )
     _publish(key, path.with_suffix(PUBLIC_SUFFIX))
     return Signer(key)
 
@@ -160,9 +164,9 @@ def read_public(path: Path) -> PublicKey:
     try:
         key = load_pem_public_key(path.read_bytes())
     except (OSError, ValueError, UnsupportedAlgorithm) as error:
-        raise BadKey(f"{path}: no public key: {error}", path=path) from error
+        raise BadKey(f"{path}: no public key: {error}; {WHICH_PUBLIC}", path=path) from error
     if not isinstance(key, Ed25519PublicKey):
-        raise BadKey(f"{path}: is no Ed25519 key", path=path)
+        raise BadKey(f"{path}: is no Ed25519 key; {WHICH_PUBLIC}", path=path)
     return PublicKey(key.public_bytes(Encoding.Raw, PublicFormat.Raw))
 
 

@@ -41,7 +41,7 @@ class Judgement:
     ok : bool
         Whether the level is ok.
     limit_n : float [N]
-        epsilon, also where it is not enforced.
+        The soft limit, also where it is not enforced.
     visibility : float
         Fraction of the hiding tissue that is away; NaN if the tissue's positions are unusable.
     visible : bool
@@ -283,5 +283,8 @@ def _check(model: TissueModel) -> None:
     triangles = model.triangles
     if triangles.ndim != 2 or triangles.shape[1] != 3 or len(triangles) == 0:
         raise MalformedModel("triangles", f"shape {triangles.shape}, expected (n, 3), n > 0")
-    if triangles.min() < 0 or triangles.max() >= len(model.nodes_m):
-        raise MalformedModel("triangles", "a triangle names a node that does not exist")
+    n_nodes = len(model.nodes_m)
+    wrong = np.flatnonzero(((triangles < 0) | (triangles >= n_nodes)).any(axis=1))
+    if len(wrong):
+        text = f"triangle {wrong[0]} names a node outside 0..{n_nodes - 1}"
+        raise MalformedModel("triangles", text)

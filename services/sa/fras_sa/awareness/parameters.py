@@ -14,7 +14,7 @@ class AwarenessParameters:
     Parameters
     ----------
     force_limit_n : float [N]
-        epsilon: a pull is interrupted above it.
+        The soft limit, the paper's epsilon: a pull is interrupted above it.
     hard_limit_n : float or None [N]
         Any action is interrupted above it; None means twice `force_limit_n`.
     no_limit : bool

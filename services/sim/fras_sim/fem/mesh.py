@@ -64,7 +64,9 @@ class Mesh:
             bad = int(np.flatnonzero(~np.isfinite(self.nodes_m).all(axis=1))[0])
             raise BadMesh(f"node {bad} has a coordinate that is not finite", node=bad)
         if self.elements.min() < 0 or self.elements.max() >= n_nodes:
-            raise BadMesh(f"an element names a node outside 0..{n_nodes - 1}", n_nodes=n_nodes)
+            outside = (self.elements < 0) | (self.elements >= n_nodes)
+            bad = int(np.flatnonzero(outside.any(axis=1))[0])
+            raise BadMesh(f"element {bad} names a node outside 0..{n_nodes - 1}", n_nodes=n_nodes)
         loose = np.flatnonzero(np.bincount(self.elements.ravel(), minlength=n_nodes) == 0)
         if len(loose):
             raise BadMesh(

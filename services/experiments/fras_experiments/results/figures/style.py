@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from fras_cli.report.figures.style import drawing
-from fras_experiments.results.writing import write_whole
+from fras_common.files import write_whole
 
 WIDTH_IN: Final = 7.2
 """Two columns of a paper."""

@@ -70,7 +70,7 @@ def _loaded() -> ctypes.CDLL:
         except OSError as error:
             failures.append(str(error))
     raise SolverUnavailable(
-        "MKL is not installed: pip install 'fras[mkl]' (x86-64 only), or solver = 'scipy' "
+        "MKL is not installed: `pip install 'fras[mkl]'` (x86-64 only), or solver = 'scipy' "
         f"({failures[0]})",
         solver="mkl",
     )
