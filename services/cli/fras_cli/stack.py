@@ -127,6 +127,12 @@ class Layout:
         mine = routers.get(placeholder(self.host), "") if self.host else ""
         return [Endpoint.parse(mine).host] if mine else []
 
+    def far_routers(self, port: int) -> dict[str, str]:
+        """Return hosts whose routers this one links to, each with its endpoint."""
+        table, routers = self.placed(port)
+        ends = {host: routers.get(placeholder(host), "") for host in table.hosts}
+        return {host: end for host, end in ends.items() if end and host != self.host}
+
     def _shipped(self) -> str:
         compose = "twin" if self.patient and self.compose == USUAL_TABLE else self.compose
         if self.keys is None:
