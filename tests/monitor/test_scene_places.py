@@ -26,7 +26,8 @@ def test_the_right_instrument_is_seen_on_the_right(place: Place):
 
 def test_a_name_stands_on_the_shaft_it_belongs_to():
     drawn = Instrument(
-        tip_m=(0.0, 0.0, 0.0), tip_xyzw=(0.0, 0.0, 0.0, 1.0), jaw_rad=0.0, blades_m=(),
+        tip_m=(0.0, 0.0, 0.0), tip_xyzw=(0.0, 0.0, 0.0, 1.0), jaw_rad=0.0,
+        blades_m=((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
         hinge_m=(0.0, 0.0, 0.0), wrist_m=(0.0, 0.0, 0.01), remote_centre_m=(0.0, 0.1, 0.01),
     )  # fmt: skip
     assert name_place_m(drawn) == pytest.approx((0.0, NAME_M, 0.01))

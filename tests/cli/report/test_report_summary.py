@@ -153,7 +153,7 @@ def test_an_arm_that_failed_is_told_in_its_own_words(log_path: Path) -> None:
     other = replace(trial, results=(failed,), statuses=statuses)
     summary = summarise(other)
     assert summary.detail == said
-    console = Console(file=io.StringIO(), width=200)
-    print_summary(console, summary, [])
-    assert f"Reason: hold:arms: {said}" in console.file.getvalue()  # type: ignore[attr-defined]
+    out = io.StringIO()
+    print_summary(Console(file=out, width=200), summary, [])
+    assert f"Reason: hold:arms: {said}" in out.getvalue()
     assert b'"detail"' not in to_json(summarise(trial))
