@@ -26,7 +26,7 @@ TABLETS: Final = {
     "tablet-upright": {"width": 820, "height": 1180},
 }
 # Slow enough that a picture of a lift is one of a lift.
-PACE: Final = 0.1
+PACE: Final = 0.05
 # What nothing is drawn on differs by less.
 WHITE: Final = 64
 EVENTS: Final = 12

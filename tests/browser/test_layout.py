@@ -82,3 +82,27 @@ def test_each_page_looks_from_where_it_likes(
     assert differing(still, other.scene()) == 0
     page.press("Overview")
     eventually(lambda: differing(before, page.scene()) == 0, "seen from the first place again")
+
+
+def test_on_a_tablet_that_is_turned_the_question_is_whole_and_the_plots_are_sharp(
+    trial: Theatre, server: Served, open_page: OpenPage
+) -> None:
+    page = open_page(server.address, scene=False, screen={"width": 1024, "height": 768})
+    trial.start(pace=SLOWLY)
+    trial.until_acting("reach")
+    page.stop()
+    trial.until_held("monitor")
+    page.reads("stopped", "arms at rest after")
+    page.page.set_viewport_size({"width": 768, "height": 1024})
+    # As many pixels are painted as are shown: what is painted smaller is stretched.
+    plot = "const one = document.getElementById('force-plot');"
+    painted = f"{plot} return Math.round(one.clientWidth * devicePixelRatio) === one.width;"
+    eventually(lambda: page.page.evaluate(f"() => {{ {painted} }}"), "the plot is painted anew")
+    page.press("Let the arms go on")
+    # The header lies over everything: what it covers is not what is found at that place.
+    found = (
+        "const box = document.getElementById('ask-title').getBoundingClientRect();"
+        "return document.elementFromPoint(box.x + 5, box.y + box.height / 2)?.id;"
+    )
+    assert page.page.evaluate(f"() => {{ {found} }}") == "ask-title"
+    page.press("No, stay")

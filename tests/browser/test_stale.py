@@ -25,7 +25,7 @@ def test_a_frozen_service_makes_the_page_old_until_it_speaks_again(
     watch.send_signal(signal.SIGSTOP)
     try:
         page.is_old()
-        page.reads("cover", "Not live: the force and visibility watch is silent for")
+        page.reads("cover", "Not live: the force and visibility watch has been silent for")
         page.reads("services", "force and visibility watch: silent")
     finally:
         watch.send_signal(signal.SIGCONT)
@@ -39,7 +39,7 @@ def test_a_killed_service_is_shown_as_gone_until_it_is_back(
     page.is_live()
     theatre.process("sim").kill()
     page.is_old()
-    page.reads("cover", "Not live: the tissue model is")
+    page.reads("cover", "Not live: the tissue model has been gone for")
     page.is_live()
 
 

@@ -12,6 +12,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = ROOT / "examples"
 EXAMPLES = [
+    "bridge.py",
     "finite_elements.py",
     "own_rule.py",
     "plan_by_hand.py",

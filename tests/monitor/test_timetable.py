@@ -56,18 +56,22 @@ def test_what_was_found_when_a_plan_was_made_is_told_as_it_was_then():
     status = p.task("idle", plan="c3", outcome="success", done=[p.done(1, TEXTS[0])])
     picture = p.picture_of(p.plan("c1", *TEXTS), fall_back, end, status)
     assert [(one.title, one.reason) for one in timetable(picture)][1:] == [
-        ("Plan 2", "The plan before was done, and the target region was still covered."),
-        ("Nothing more to do", "The plan before was done, and the target region was exposed."),
+        ("Plan 2", "The previous plan was carried out, and the target region was not yet exposed."),
+        (
+            "Nothing more to do",
+            "The previous plan was carried out, and the target region was exposed.",
+        ),
     ]
     assert latest_changes(picture) == [
-        "No new plan is needed: the plan before was done, and the target region was exposed."
+        "No new plan is needed: the previous plan was carried out, "
+        "and the target region was exposed."
     ]
 
 
 def test_a_goal_that_asks_for_more_than_to_see_is_not_told_as_covered():
     plans = (p.plan("c1", *TEXTS), p.plan("c2", TEXTS[0], reason="exposure", goal="clear"))
     assert latest_changes(p.picture_of(*plans, p.task(plan="c2"))) == [
-        "New plan because the plan before was done, and more was to do."
+        "New plan because the previous plan was carried out, and more was to do."
     ]
 
 
@@ -75,7 +79,7 @@ def test_no_plan_is_not_told_as_a_goal_that_was_reached():
     none = p.plan("c2", reason="exposure", no_plan=NoPlan(core=[], sentences=["x"]))
     (_, section) = timetable(p.picture_of(p.plan("c1", *TEXTS), none, p.task(plan="c2")))
     assert section.title == "Plan 2"
-    assert section.reason.endswith("still covered.")
+    assert section.reason.endswith("not yet exposed.")
 
 
 def test_an_action_that_did_not_succeed_says_why():
@@ -113,13 +117,31 @@ def test_the_page_lays_out_a_trial_under_way():
     assert view.force is not None
     assert view.force.words == "0.60 N, above the limit of 0.50 N"
     assert view.visibility is not None
-    assert view.visibility.words == "target region covered: 99.5% clear, more than 99.5% is needed"
+    assert view.visibility.words == "not exposed: 99.4% lifted clear, more than 99.5% is needed"
     assert [one.text for one in view.situation] == [
         "the jaws of the right instrument are closed",
         "1 of 4 points lie over an attachment",
     ]
     assert course_of(picture).at_s == [1.0]
     assert {one.life for one in view.services} == {"ready"}
+
+
+def test_a_crossing_is_expected_of_what_moves_alone():
+    heard = (p.task(action=TEXTS[2], plan="c1"), p.verdict(50, max_force_n=0.4, crossing_tick=60))
+    moving = view_of(p.picture_of(*heard, p.robot()), StopRecord(), 0.1)
+    assert moving.force is not None
+    assert moving.force.words == "0.40 N, limit 0.50 N, expected to cross it soon"
+    held = view_of(p.picture_of(*heard, p.robot(holds={"monitor": ""})), StopRecord(), 0.1)
+    assert held.force is not None
+    assert held.force.words == "0.40 N, limit 0.50 N"
+
+
+def test_a_recording_is_told_as_complete_or_not():
+    recorded = p.picture_of(p.recorder_status("closed"))
+    assert view_of(recorded, StopRecord(), 0.1).log == "The recording is closed and complete."
+    cut = view_of(p.picture_of(p.recorder_status("closed", lost=3)), StopRecord(), 0.1)
+    assert cut.log == "The recording is closed. Parts of it are missing (3)."
+    assert not cut.log_fine
 
 
 def test_a_held_arm_is_the_headline_but_not_after_the_end():

@@ -87,24 +87,36 @@ def test_who_holds_and_why(holder: str, reason: str, told: str):
 
 def test_a_sentence_of_the_planner_is_put_into_words():
     said = (
-        "psm1 grasps b(3,4): 17 mm from the nearest attachment point, 13 mm from the region of "
+        "psm1 grasps b(3,4): no other arm reaches it, 13 mm from the region of "
         "interest; best of 25 candidate blocks under the criterion 'weighted'."
     )
     assert plain(said) == (
-        "the right instrument grasps point 3-4: 17 mm from the nearest attachments, 13 mm from "
+        "the right instrument grasps point 3-4: no other instrument reaches it, 13 mm from "
         "the target region; best of 25 possible points by the chosen preference."
     )
+
+
+@pytest.mark.parametrize(
+    ("said", "told"),
+    [
+        ("it lies over an attachment point.", "it lies over an attachment."),
+        ("attachment points are ignored", "attachments are ignored"),
+        ("the arm control refused", "the arm control refused"),
+    ],
+)
+def test_one_and_many_are_told_apart(said: str, told: str):
+    assert plain(said) == told
 
 
 @pytest.mark.parametrize(
     ("name", "value", "told"),
     [
         ("distance_m", 1.04e-17, "distance 0 mm"),
-        ("at_distance_m", 0.005, "at distance 5 mm"),
-        ("jaw_rad", -0.3490658503988659, "jaw -20 °"),
-        ("threshold_fraction", 0.7, "threshold 70%"),
+        ("at_distance_m", 0.005, "counts as there up to 5 mm"),
+        ("jaw_rad", -0.3490658503988659, "jaws at -20 °"),
+        ("threshold_fraction", 0.995, "needed: more than 99.5%"),
         ("max_force_n", 0.51234, "max force 0.51 N"),
-        ("fixed_points", 42.0, "fixed points 42"),
+        ("fixed_points", 42.0, "attachments under it 42"),
     ],
 )
 def test_evidence_has_units(name: str, value: float, told: str):
@@ -127,4 +139,4 @@ def test_what_a_later_plan_does_otherwise():
 
 def test_why_there_is_no_plan_is_told_in_its_place():
     none = NoPlan(core=["try_once"], sentences=["No arm reaches any block."])
-    assert why(p.plan("c1", no_plan=none)) == ["No arm reaches any point."]
+    assert why(p.plan("c1", no_plan=none)) == ["No instrument reaches any point."]

@@ -137,6 +137,8 @@ def test_a_driver_that_fails_ends_the_action_by_the_name_of_its_service(
     result = ticks[-1].result
     assert result is not None
     assert (result.outcome, result.reason) == ("aborted", "hold:arms")
+    assert result.text == "psm1 does not answer"
+    assert result.values["arm"] == "psm1"
     assert (result.tick, len(ticks)) == (20, 20)
     last = controller.snapshot
     assert last.tick == 20

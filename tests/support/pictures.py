@@ -130,3 +130,7 @@ def picture_of(*messages: object, at_s: float = 0.0, services: Any = SERVICES) -
     for message in messages:
         picture = apply(picture, message, at_s)
     return picture
+
+
+def recorder_status(state: Any, lost: int = 0) -> m.RecorderStatus:
+    return m.RecorderStatus(state=state, path="", messages=9, bytes=9, lost=lost, reason="")

@@ -4,9 +4,14 @@ import re
 import signal
 import subprocess
 import sys
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+
+import tomlkit
+
+from fras_supervisor import find_table
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
@@ -47,3 +52,22 @@ def test_a_log_is_read_with_the_stock_reader(quiet: Path) -> None:
     assert re.search(r"^plan: reach\(psm\d,b\(\d,\d\)\) → grasp", done.stdout, re.MULTILINE)
     assert re.search(r"^messages: motion \d+, ", done.stdout, re.MULTILINE)
     assert re.search(r"^pull\(psm\d\) +at most 0\.\d{3} N$", done.stdout, re.MULTILINE)
+
+
+def test_a_trial_runs_with_the_smallest_bridge(tmp_path: Path) -> None:
+    table = tomllib.loads(find_table("crtk").read_text(encoding="utf-8"))
+    table["process"]["arms"] |= {
+        "command": ["{python}", str(EXAMPLES / "bridge.py"), "{connect}", "{cell}"],
+        "watchdog_s": 0.0,
+    }
+    mine = tmp_path / "mine.toml"
+    mine.write_text(tomlkit.dumps(table), encoding="utf-8")
+    command = ["run", "--compose", str(mine), "--mesh", "11,13,2", "--out", str(tmp_path / "out")]
+    done = subprocess.run(
+        [sys.executable, "-m", "fras_cli", *command, "--cell", "bridge-test"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "The region of interest is exposed." in done.stdout

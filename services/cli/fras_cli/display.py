@@ -134,7 +134,8 @@ def print_summary(console: Console, summary: Summary, places: Iterable[tuple[str
     style = "bold green" if summary.outcome == "success" else "bold red"
     console.print(Text(OUTCOME_WORDS[summary.outcome], style=style))
     if summary.outcome != "success":
-        console.print(Text(f"Reason: {summary.reason}"))
+        detail = f": {summary.detail}" if summary.detail else ""
+        console.print(Text(f"Reason: {summary.reason}{detail}"))
     table = Table(show_header=False, box=None, padding=(0, 2))
     rows = [
         ("actions", " → ".join(summary.actions) or "none"),

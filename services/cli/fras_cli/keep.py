@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from fras_cli import runtime
+from fras_cli.far_routers import FarRouters
 from fras_cli.link import Link
 from fras_cli.other_hosts import OtherHosts
 from fras_cli.plan_words import HOLDER
@@ -63,9 +64,14 @@ def up(cell: str, port: int, log_dir: Path, console: Console, layout: Layout = U
                     f"{connect}, logs in {log_dir}; Ctrl-C or `fras down --cell {cell}` stops it"
                 )
                 others = OtherHosts(stack.elsewhere)
+                routers = FarRouters(layout.far_routers(port))
                 while not stopping():
-                    if said := others.look(stack.link.missing()):
-                        console.print(said, soft_wrap=True)
+                    missing = stack.link.missing()
+                    told = [others.look(missing)]
+                    waiting = any(name in stack.elsewhere for name in missing)
+                    told += routers.look(waiting=waiting, now_s=time.monotonic())
+                    for said in filter(None, told):
+                        console.print(escape(said), soft_wrap=True)
                     if (now := stack.watch()) and now != gone:
                         console.print(
                             escape(f"{now}; {WHAT_NOW}"), style="bold red", soft_wrap=True

@@ -57,8 +57,7 @@ class Layout:
     addresses : mapping of str to str
         Where the routers of hosts are.
     patient : bool
-        A patient has to be among its processes: the usual table is then `twin`. Nothing that a
-        person has asked for, so it makes no other layout.
+        A patient has to be among its processes: the usual table is then `twin`, no other layout.
     """
 
     compose: str = USUAL_TABLE
@@ -126,6 +125,12 @@ class Layout:
         """List where others reach a router of this host; empty if none asks for it."""
         mine = routers.get(placeholder(self.host), "") if self.host else ""
         return [Endpoint.parse(mine).host] if mine else []
+
+    def far_routers(self, port: int) -> dict[str, str]:
+        """Return hosts whose routers this one links to, each with its endpoint."""
+        table, routers = self.placed(port)
+        others = {host: placeholder(host) for host in table.hosts if host != self.host}
+        return {host: routers[name] for host, name in others.items() if name in routers}
 
     def _shipped(self) -> str:
         compose = "twin" if self.patient and self.compose == USUAL_TABLE else self.compose

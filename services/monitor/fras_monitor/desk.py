@@ -124,11 +124,11 @@ class Desk:
         def on_done(answer: HoldState | FrasError) -> None:
             what = hold_in_words(holder)
             if isinstance(answer, FrasError):
-                self._tell(sentence(f"Not lifted: {what}: {plain(str(answer))}"), good=False)
+                self._tell(sentence(f"Not ended: {what}: {plain(str(answer))}"), good=False)
                 return
             if holder == HOLDER:
                 self._stopper.clear()
-            self._tell(sentence(f"Lifted: {what}"))
+            self._tell(sentence(f"Ended: {what}"))
 
         return on_done
 

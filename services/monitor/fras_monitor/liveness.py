@@ -71,6 +71,10 @@ def freshness(picture: Picture, now_s: float) -> Freshness:
         return Freshness(live=False, words="Waiting for the system to start.")
     lost = [one for one in judged if one.life in ("late", "dead", "absent")]
     if lost:
-        who = ", ".join(f"the {service_in_words(one.name)} is {one.words}" for one in lost)
+        who = ", ".join(f"the {service_in_words(one.name)} {_been(one)}" for one in lost)
         return Freshness(live=False, words=f"Not live: {who}.")
     return Freshness(live=True, words="Live.")
+
+
+def _been(one: ServiceLife) -> str:
+    return f"is {one.words}" if one.life == "absent" else f"has been {one.words}"

@@ -20,6 +20,8 @@ BLADE_END_M: Final = 0.0004
 # What is drawn of the shaft: the whole of it hides the tissue from most sides.
 SHAFT_LENGTH_M: Final = 0.12
 DASH_M: Final = 0.003
+# Where on the shaft its name stands: above the tissue in most poses, and in sight.
+NAME_M: Final = 0.03
 INSTRUMENT_RADII_M: Final = np.array(
     [
         (SHAFT_RADIUS_M, SHAFT_RADIUS_M),
@@ -100,6 +102,14 @@ def instrument_mesh(drawn: Instrument) -> Mesh:
         *((drawn.hinge_m, end) for end in drawn.blades_m),
     ]
     return cones(np.array(ends), INSTRUMENT_RADII_M)
+
+
+def name_place_m(drawn: Instrument) -> tuple[float, float, float]:
+    """Where on the shaft an instrument's name stands [m]."""
+    wrist, centre = np.array(drawn.wrist_m), np.array(drawn.remote_centre_m)
+    away = centre - wrist
+    x, y, z = wrist + away * min(1.0, NAME_M / max(float(np.linalg.norm(away)), 1e-9))
+    return float(x), float(y), float(z)
 
 
 def ring(centre_m: Sequence[float], radius_m: float, tube_m: float, count: int = 48) -> Mesh:

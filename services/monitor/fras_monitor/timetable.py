@@ -94,7 +94,7 @@ def cause(plan: Plan) -> str:
         return f"{told}, and the target region was exposed"
     if plan.reason != "exposure":
         return told
-    left = "the target region was still covered" if plan.goal == "visible" else "more was to do"
+    left = "the target region was not yet exposed" if plan.goal == "visible" else "more was to do"
     return f"{told}, and {left}"
 
 

@@ -12,6 +12,7 @@ from fras_monitor.words import (
     evidence_in_words,
     fluent_in_words,
     hold_in_words,
+    percent,
     phase_in_words,
     plain,
     point,
@@ -141,7 +142,7 @@ def view_of(picture: Picture, stop: StopRecord, now_s: float) -> View:
         trial=picture.trial,
         headline=_headline(picture, fresh),
         outcome=_outcome(task.outcome, task.reason) if task is not None else "",
-        force=_force(verdict) if verdict is not None else None,
+        force=_force(verdict, held=bool(holds)) if verdict is not None else None,
         visibility=_visibility(picture, verdict) if verdict is not None else None,
         holds=holds,
         hold_words=[_hold(holder, reason) for holder, reason in holds.items()],
@@ -219,7 +220,7 @@ def _decisions(task: TaskStatus | None) -> list[str]:
     return told
 
 
-def _force(verdict: Verdict) -> Force:
+def _force(verdict: Verdict, *, held: bool) -> Force:
     words = {
         "ok": f"{verdict.max_force_n:.2f} N, limit {verdict.limit_n:.2f} N",
         "soft": f"{verdict.max_force_n:.2f} N, above the limit of {verdict.limit_n:.2f} N",
@@ -228,8 +229,9 @@ def _force(verdict: Verdict) -> Force:
         ),
         "invalid": "the tissue model has no valid solution",
     }[verdict.level]
-    if verdict.level == "ok" and verdict.crossing_tick > verdict.tick:
-        words += ", expected to cross its limit soon"
+    # What stands still crosses nothing.
+    if verdict.level == "ok" and verdict.crossing_tick > verdict.tick and not held:
+        words += ", expected to cross it soon"
     return Force(
         value_n=verdict.max_force_n,
         limit_n=verdict.limit_n,
@@ -243,19 +245,14 @@ def _visibility(picture: Picture, verdict: Verdict) -> Visibility:
     context = picture.of_trial(picture.context)
     evidence = context.evidence.get("visible_roi", {}) if context is not None else {}
     threshold = evidence.get("threshold_fraction")
-    needed = f", more than {_percent(threshold)} is needed" if threshold is not None else ""
-    state = "visible" if verdict.visible else "covered"
+    needed = f", more than {percent(threshold)} is needed" if threshold is not None else ""
+    state = "exposed" if verdict.visible else "not exposed"
     return Visibility(
         share=verdict.visibility,
         threshold=threshold,
         visible=verdict.visible,
-        words=f"target region {state}: {_percent(verdict.visibility)} clear{needed}",
+        words=f"{state}: {percent(verdict.visibility)} lifted clear{needed}",
     )
-
-
-def _percent(share: float) -> str:
-    """Tell a share so that one just below another does not read as equal to it."""
-    return f"{100.0 * share:.1f}%"
 
 
 def course_of(picture: Picture) -> Course:
@@ -304,14 +301,15 @@ def _log(picture: Picture) -> tuple[str, bool]:
     if heard is None:
         return "Nothing is known of a recording.", False
     status = heard.message
-    lost = f" {status.lost} messages were lost." if status.lost else ""
+    lost = f" Parts of it are missing ({status.lost})." if status.lost else ""
     match status.state:
         case "recording":
             return f"Recording.{lost}", status.lost == 0
         case "behind":
             return f"The recording is behind; the arms wait.{lost}", False
         case "closed":
-            return f"Recorded and closed: {status.messages} messages.{lost}", status.lost == 0
+            closed = "The recording is closed"
+            return f"{closed}.{lost}" if lost else f"{closed} and complete.", status.lost == 0
         case "error":
             return f"Not recording: {plain(status.reason)}.", False
         case "idle":

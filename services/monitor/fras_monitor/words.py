@@ -1,5 +1,6 @@
 """Names, actions and reasons of the messages in words that a surgeon uses."""
 
+import math
 import re
 from collections.abc import Callable, Mapping
 from functools import lru_cache
@@ -62,13 +63,13 @@ OUTCOMES: Final = {
 
 _REASONS: Final = {
     "initial": "the procedure begins",
-    "exposure": "the plan before was done",
+    "exposure": "the previous plan was carried out",
     "force": "the force limit was crossed",
     "force_soft": "the force limit was crossed",
     "force_hard": "the hard force limit was crossed",
-    "hold": "the arms were stopped and let go again",
+    "hold": "the arms were stopped, then allowed to go on",
     "restart": "a part of the system had to start again",
-    "rejected": "the plan before was rejected",
+    "rejected": "the previous plan was rejected",
     "nothing_in_reach": "the jaws closed on nothing",
     "replans": "as many new plans were made as are allowed",
     "hold:solver": "the tissue model had no valid solution",
@@ -84,7 +85,7 @@ _FLUENTS: Final[tuple[tuple[str, str], ...]] = (
     (r"max_height\((\w+)\)", r"{0} may not lift higher"),
     (r"fixed\((b\(\d+,\d+\))\)", r"{0} lies over an attachment"),
     (r"above_roi\((b\(\d+,\d+\))\)", r"{0} lies above the target region"),
-    (r"visible_roi", r"the target region is visible"),
+    (r"visible_roi", r"the target region is exposed"),
 )
 
 _EVIDENCE: Final[Mapping[str, tuple[str, float]]] = {
@@ -92,6 +93,23 @@ _EVIDENCE: Final[Mapping[str, tuple[str, float]]] = {
     "_m": ("mm", 1e3),
     "_n": ("N", 1.0),
     "_s": ("s", 1.0),
+}
+
+# What a number is, without the unit at the end of its name.
+_MEASURES: Final[Mapping[str, str]] = {
+    "visible": "lifted clear",
+    "threshold": "needed: more than",
+    "margin": "beyond what is needed",
+    "at_distance": "counts as there up to",
+    "jaw": "jaws at",
+    "closed_jaw": "count as closed up to",
+    "roi_offset_x": "from the target region in x",
+    "roi_offset_y": "in y",
+    "half_cell_x": "counts as above it up to x",
+    "half_cell_y": "y",
+    "fixed_points": "attachments under it",
+    "rest_y": "y at rest",
+    "middle_y": "middle of the tissue y",
 }
 
 _BLOCK: Final = re.compile(r"b\((\d+),\s*(\d+)\)")
@@ -103,12 +121,13 @@ _ATOM: Final = re.compile(
 _PHRASES: Final[tuple[tuple[re.Pattern[str], str], ...]] = (
     (re.compile(r"\bregion of interest\b"), "target region"),
     (re.compile(r"\bROI\b"), "target region"),
-    (re.compile(r"\battachment points?\b"), "attachments"),
+    (re.compile(r"\battachment point(s?)\b"), r"attachment\1"),
     (re.compile(r"\bcandidate blocks?\b"), "possible points"),
     (re.compile(r"\bblocks\b"), "points"),
     (re.compile(r"\bblock\b"), "point"),
     (re.compile(r" under the criterion '\w+'"), " by the chosen preference"),
     (re.compile(r"\bgripper\b"), "jaws"),
+    (re.compile(r"\barm(s?)\b(?! control)"), r"instrument\1"),
     (re.compile(r"\b[Rr]e-plan"), "new plan"),
 )
 
@@ -165,10 +184,15 @@ def evidence_in_words(name: str, value: float) -> str:
     """Tell a number behind an atom with its unit, as its name says: `distance_m` in mm."""
     for ending, (unit, factor) in _EVIDENCE.items():
         if name.endswith(ending):
-            return f"{_spaced(name.removesuffix(ending))} {_number(value * factor)} {unit}"
+            return f"{_measure(name.removesuffix(ending))} {_number(value * factor)} {unit}"
     if name.endswith("_fraction"):
-        return f"{_spaced(name.removesuffix('_fraction'))} {value:.0%}"
-    return f"{_spaced(name)} {_number(value)}"
+        return f"{_measure(name.removesuffix('_fraction'))} {percent(value)}"
+    return f"{_measure(name)} {_number(value)}"
+
+
+def percent(share: float) -> str:
+    """Tell a share so that one just below a tenth of a percent does not read as that."""
+    return f"{math.floor(round(1000.0 * share, 6)) / 10.0:.1f}%"
 
 
 def reason_in_words(reason: str) -> str:
@@ -179,9 +203,9 @@ def reason_in_words(reason: str) -> str:
     rest = rest.strip()
     tellers: Mapping[str, Callable[[str], str]] = {
         "refused": lambda text: f"arm control refused: {plain(text)}",
-        "hold": lambda text: f"the arms were held and not let go: {hold_in_words(text)}",
+        "hold": lambda text: f"the arms were held and not allowed to go on: {hold_in_words(text)}",
         "gate": lambda text: f"the safeguard '{text.replace('_', ' ')}' stopped the arm",
-        "rejected": lambda text: f"the plan before was rejected: {plain(text)}",
+        "rejected": lambda text: f"the previous plan was rejected: {plain(text)}",
         "deviation": lambda text: f"not as expected: {plain(text)}",
     }
     return tellers[head](rest) if colon and head in tellers else plain(reason)
@@ -230,8 +254,8 @@ def _named(term: str) -> str:
     return point(term) if _BLOCK.fullmatch(term) else instrument(term)
 
 
-def _spaced(name: str) -> str:
-    return name.replace("_", " ")
+def _measure(name: str) -> str:
+    return _MEASURES.get(name, name.replace("_", " "))
 
 
 def _number(value: float) -> str:

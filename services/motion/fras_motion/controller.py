@@ -296,7 +296,7 @@ class MotionController:
             for name, driver in self._drivers.items():
                 self._measured[name] = driver.measure(self._parameters.dt_s)
         except DriverFault as fault:
-            ending = Ending("aborted", f"hold:{fault.whose}")
+            ending = Ending("aborted", f"hold:{fault.whose}", str(fault), fault.values)
             progress = replace(progress, phase="interrupted", ending=ending)
         self._remember_grasp(course.goal.arm)
         tick = self._last.tick + 1

@@ -1,13 +1,17 @@
 """The numbers of `summary.json`, against those that the log was made from."""
 
+import io
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import msgspec
 import pytest
+from rich.console import Console
 
+from fras_cli.display import print_summary
 from fras_cli.report import read_trial, summarise, to_json
 from fras_cli.report.summary import CUT_SHORT
 
@@ -136,3 +140,20 @@ def test_what_awareness_could_not_measure_is_null(new_log: Callable[..., Any], s
     assert summary.visibility is None
     assert summary.max_force_n is not None
     assert summary.max_force_n >= 0
+
+
+def test_an_arm_that_failed_is_told_in_its_own_words(log_path: Path) -> None:
+    trial = read_trial(log_path)
+    said = "psm2 does not say where it is: does the process that drives it run?"
+    ended = {"outcome": "aborted", "reason": "hold:arms"}
+    failed = msgspec.structs.replace(trial.results[-1], **ended, text=said)
+    statuses = tuple(
+        msgspec.structs.replace(one, **ended) if one.outcome else one for one in trial.statuses
+    )
+    other = replace(trial, results=(failed,), statuses=statuses)
+    summary = summarise(other)
+    assert summary.detail == said
+    out = io.StringIO()
+    print_summary(Console(file=out, width=200), summary, [])
+    assert f"Reason: hold:arms: {said}" in out.getvalue()
+    assert b'"detail"' not in to_json(summarise(trial))

@@ -78,6 +78,8 @@ class Summary(msgspec.Struct, frozen=True, kw_only=True):
     complete : bool
         Whether the file is whole; else the numbers hold for what came before the cut.
     versions : dict of str to str
+    detail : str, optional
+        What the gate or the arm that ended the trial's last action said of it.
     patient : PatientSummary, optional
         Left out where the trial has no patient besides its model.
     """
@@ -106,6 +108,7 @@ class Summary(msgspec.Struct, frozen=True, kw_only=True):
     head: str
     complete: bool
     versions: dict[str, str]
+    detail: str | UnsetType = UNSET
     patient: PatientSummary | UnsetType = UNSET
 
 
@@ -144,6 +147,7 @@ def summarise(trial: Trial) -> Summary:
         head=trial.metadata.get("head", ""),
         complete=trial.complete,
         versions=_versions(trial),
+        detail=_detail(trial),
         patient=_patient(trial, max(forces, default=None)),
     )
 
@@ -151,6 +155,12 @@ def summarise(trial: Trial) -> Summary:
 def to_json(summary: Summary) -> bytes:
     """Encode as indented JSON with a final newline."""
     return msgspec.json.format(msgspec.json.encode(summary), indent=2) + b"\n"
+
+
+def _detail(trial: Trial) -> str | UnsetType:
+    last = trial.results[-1] if trial.results else None
+    ended = trial.ending is not None and last is not None and trial.ending.reason == last.reason
+    return last.text if last is not None and ended and last.text else UNSET
 
 
 def _patient(trial: Trial, believed_max_n: float | None) -> PatientSummary | UnsetType:

@@ -49,7 +49,7 @@ class ActionResult(Header, frozen=True, kw_only=True):
     Attributes
     ----------
     text : str
-        What the gate said that ended it; empty else.
+        What the gate, or the arm that failed, said of it; empty else.
     values : dict
         The numbers and names behind the text.
     """

@@ -13,7 +13,7 @@ from fras_log.export.instruments import instrument
 from fras_monitor.commands import Colouring, Place
 from fras_monitor.page.door import PAGE, WHO
 from fras_monitor.picture import Picture
-from fras_monitor.shapes import FloatArray, Mesh, ball, instrument_mesh, ring
+from fras_monitor.shapes import FloatArray, Mesh, ball, instrument_mesh, name_place_m, ring
 from fras_monitor.stage import (
     ABOVE_M,
     CLEAR_M,
@@ -27,6 +27,7 @@ from fras_monitor.stage import (
     path_of,
 )
 from fras_monitor.surface import BANDS, bands, share_of
+from fras_monitor.words import ARMS
 
 # Okabe and Ito's palette: distinct under every common colour vision.
 BLOCK_COLOURS: Final = {
@@ -42,12 +43,13 @@ PATH: Final = rgb("#cc79a7")
 ARM_COLOURS: Final = {"psm1": rgb("#8d99a8"), "psm2": rgb("#b3a48e")}
 BLOCK_RADIUS_M: Final = 0.0016
 TUBE_M: Final = 0.0006
-EYE_M: Final = (0.155, -0.075, 0.115)
+# From each of them the right instrument, psm1, is seen on the right.
+EYE_M: Final = (-0.055, -0.075, 0.115)
 LOOK_AT_M: Final = (0.05, 0.055, 0.012)
 PLACES: Final[Mapping[Place, tuple[float, float, float]]] = {
     "overview": EYE_M,
-    "above": (0.05, 0.054, 0.27),
-    "side": (0.26, 0.055, 0.05),
+    "above": (0.049, 0.055, 0.27),
+    "side": (-0.16, 0.055, 0.05),
 }
 # Colour, width [m] and height, in ABOVE_M, of the lines that an edge is drawn with.
 EDGES: Final = {
@@ -153,10 +155,6 @@ class Scene:
         over = (*ground.roi_m[:2].tolist(), ground.top_m + 0.001)
         self._mesh("/target/ring", ring(over, CLEAR_M, TUBE_M), COVERED)
         self._mesh("/target/centre", ring(ground.roi_m.tolist(), 0.003, 0.0009), COVERED)
-        self._nodes["/target/label"] = scene.add_label(
-            "/target/label", "target region", position=(over[0], over[1], over[2] + 0.004),
-            font_size_mode="screen", font_screen_scale=0.8, depth_test=False,
-        )  # fmt: skip
 
     def _draw_tissue(self, picture: Picture, tissue: TissueState) -> None:
         ground = self._ground
@@ -199,7 +197,20 @@ class Scene:
             if self._stand.get(name) != stands:
                 self._stand[name] = stands
                 colour = ARM_COLOURS.get(name, COVERED)
-                self._mesh(f"/instruments/{name}", instrument_mesh(instrument(arm)), colour)
+                drawn = instrument(arm)
+                self._mesh(f"/instruments/{name}", instrument_mesh(drawn), colour)
+                self._name(name, name_place_m(drawn))
+
+    def _name(self, arm: str, place_m: tuple[float, float, float]) -> None:
+        """Write beside an instrument which it is."""
+        key = f"/instruments/{arm}/name"
+        if (handle := self._nodes.get(key)) is not None:
+            handle.position = place_m
+            return
+        self._nodes[key] = self._server.scene.add_label(
+            key, ARMS.get(arm, arm), position=place_m, font_size_mode="screen",
+            font_screen_scale=0.8, depth_test=False, anchor="center-left",
+        )  # fmt: skip
 
     def _draw_blocks(self, places_m: FloatArray, kinds: Sequence[BlockKind]) -> None:
         places = (places_m + ABOVE_M).astype(np.float32)
@@ -238,8 +249,6 @@ class Scene:
         colour = VISIBLE if visible else COVERED
         for name in ("/target/ring", "/target/centre"):
             self._nodes[name].color = colour
-        text = "target region: visible" if visible else "target region: covered"
-        self._nodes["/target/label"].text = text
 
     def _mesh(self, name: str, mesh: Mesh, colour: tuple[int, int, int]) -> None:
         handle = self._nodes.get(name)

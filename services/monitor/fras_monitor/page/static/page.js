@@ -117,7 +117,10 @@ function show(news) {
   }
   if ("decisions" in news) fill($("decisions"), news.decisions, (one) => element("li", one));
   if ("plans" in news) plan(news.plans);
-  if ("why" in news) fill($("why"), news.why, (one) => element("li", one));
+  if ("why" in news) {
+    $("why-card").hidden = news.why.length === 0;
+    fill($("why"), news.why, (one) => element("li", one));
+  }
   if ("changes" in news) {
     $("changes-card").hidden = news.changes.length === 0;
     fill($("changes"), news.changes, (one) => element("li", one));
@@ -299,6 +302,8 @@ $("rate").onchange = () => {
   $("rate").blur();
 };
 window.addEventListener("keydown", onKey, { capture: true });
+// A tablet that is turned: what stands still would be shown stretched.
+window.addEventListener("resize", () => known.course && plots());
 
 $("scene").src = `scene/${page}/`;
 
