@@ -47,3 +47,18 @@ def test_a_log_is_read_with_the_stock_reader(quiet: Path) -> None:
     assert re.search(r"^plan: reach\(psm\d,b\(\d,\d\)\) → grasp", done.stdout, re.MULTILINE)
     assert re.search(r"^messages: motion \d+, ", done.stdout, re.MULTILINE)
     assert re.search(r"^pull\(psm\d\) +at most 0\.\d{3} N$", done.stdout, re.MULTILINE)
+
+
+def test_of_a_cut_log_the_stock_reader_tells_what_makes_it_whole(
+    quiet: Path, tmp_path: Path
+) -> None:
+    whole = quiet / "audit.mcap" if quiet.is_dir() else quiet
+    (tmp_path / "audit.mcap").write_bytes(whole.read_bytes()[: whole.stat().st_size // 2])
+    done = subprocess.run(
+        [sys.executable, str(EXAMPLES / "read_log.py"), str(tmp_path)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr.strip().endswith("fras log recover makes it whole")
