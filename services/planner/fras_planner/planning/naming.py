@@ -1,8 +1,9 @@
 """Whether each rule that forbids something is declared: one that is not would count for nothing."""
 
 from collections.abc import Collection
+from typing import Any
 
-from clingo.ast import AST, ASTType, parse_string
+from clingo.ast import ASTType, parse_string
 
 from fras_planner.planning.errors import KnowledgeFault
 from fras_planner.planning.program import Knowledge
@@ -47,7 +48,7 @@ def _names(text: str) -> list[tuple[int, str]]:
     """Names of rules that forbid, as constants, each with its line."""
     found: list[tuple[int, str]] = []
 
-    def look(statement: AST) -> None:
+    def look(statement: Any) -> None:
         if statement.ast_type != ASTType.Rule or statement.head.ast_type != ASTType.Literal:
             return
         head = statement.head.atom
