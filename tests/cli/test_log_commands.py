@@ -3,6 +3,7 @@
 import io
 import json
 import random
+import re
 from pathlib import Path
 from typing import Any
 
@@ -217,3 +218,17 @@ def test_a_key_of_another_kind_is_told(tmp_path: Path, path: Path):
     status, said = fras("verify", path, "--key", key)
     assert status == 1
     assert f"{key}: no public key" in said
+
+
+def test_ticks_that_a_key_does_not_have_are_told(path: Path) -> None:
+    status, said = fras("show", path, "sa/verdict", "--from", "9000")
+    assert status == 1
+    assert re.search(r"no message of 'sa/verdict' in these ticks; it has \d+ to \d+$", said)
+
+
+@pytest.mark.parametrize("head", ["9f2c", "9f2c...", "zz" * 32])
+def test_a_head_that_is_not_whole_is_not_held_against_the_log(path: Path, head: str) -> None:
+    status, said = fras("verify", path, "--head", head)
+    assert status == 2
+    assert "a head is 64 hexadecimal digits" in said
+    assert "NOT what was recorded" not in said

@@ -73,9 +73,16 @@ def test_bad_option_names_key_and_value(options: dict[str, Any], key: str) -> No
     assert str(caught.value.values["key"]).startswith(key)
 
 
-@pytest.mark.parametrize("text", ["3", "5..2", "a..b", "1...3", ""])
-def test_bad_seeds(text: str) -> None:
-    with pytest.raises(ScenarioError, match="a range such as"):
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("3", "one alone is 3..3"),
+        ("5..2", "the smaller one comes first: 2..5"),
+        *((text, "a range such as") for text in ("a..b", "1...3", "")),
+    ],
+)
+def test_bad_seeds(text: str, told: str) -> None:
+    with pytest.raises(ScenarioError, match=told):
         parse_seeds(text)
 
 

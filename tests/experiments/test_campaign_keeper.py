@@ -29,6 +29,7 @@ class Stacks:
         self.folder = folder
         self.begun: list[str] = []
         self.patients: list[bool] = []
+        self.rules: list[Path | None] = []
         # One that has nothing to do, and one that has.
         self.plans = [SimpleNamespace(actions=actions) for actions in ([], ["reach"])]
         self.ends: list[str] = []
@@ -57,6 +58,7 @@ class Stacks:
         (logs / "sim.log").write_text("what sim said", encoding="utf-8")
         self.begun.append(cell)
         self.patients.append(layout.patient)
+        self.rules.append(layout.asp_dir)
         self.gone = ""
         link = SimpleNamespace(wait_complete=lambda timeout_s: True)
         yield SimpleNamespace(link=link, watch=lambda: self.gone)
@@ -70,8 +72,8 @@ class Stacks:
         (folder / "audit.mcap").write_bytes(b"log of " + trial.encode())
         return self.play(folder)
 
-    def worker(self, keep: str = "failed", code: str | None = None) -> Keeper:
-        one = Keeper("c", b"", keep, code or code_digest(), own=False)
+    def worker(self, keep: str = "failed", code: str | None = None, **given: Any) -> Keeper:
+        one = Keeper("c", b"", keep, code or code_digest(), own=False, **given)
         one.setup(SimpleNamespace(name=0, local_directory=str(self.folder)))  # type: ignore[arg-type]
         return one
 
@@ -95,6 +97,19 @@ def until_plan(number: int) -> Task:
 def outcome(done: Done) -> tuple[str, str]:
     assert done.record is not None, done.problem
     return done.record.result.outcome, done.record.result.reason
+
+
+def test_rules_of_ones_own_travel_by_value_to_the_planner_of_its_stack(stacks: Stacks):
+    one = stacks.worker(rules={"domain.lp": "a.", "preferences/sum.lp": "b."})
+    assert outcome(one.run(task(0)))[0] == "success"
+    (folder,) = stacks.rules
+    assert folder is not None
+    assert (folder / "preferences" / "sum.lp").read_text() == "b."
+    stacks.end(one)
+    other = stacks.worker()
+    assert outcome(other.run(task(0)))[0] == "success"
+    assert stacks.rules[1] is None
+    stacks.end(other)
 
 
 def test_one_stack_serves_many_trials_and_ends_with_the_worker(stacks: Stacks):

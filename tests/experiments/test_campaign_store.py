@@ -69,6 +69,24 @@ def test_a_record_that_was_spoilt_is_run_again(tmp_path: Path, prepared: Prepare
             assert (set(found.records), found.spoilt) == ({1}, 1)
 
 
+def test_other_rules_are_another_campaign_and_lie_beside_its_results(
+    tmp_path: Path, prepared: Prepared
+):
+    own = prepared.by_rules({"domain.lp": "a.", "preferences/sum.lp": "b."})
+    with opened(tmp_path / "own", own, CODE) as store:
+        store.put(0, record(), {})
+    assert (tmp_path / "own" / "asp" / "preferences" / "sum.lp").read_text() == "b."
+    with opened(tmp_path / "own", own, CODE) as store:
+        assert set(store.load().records) == {0}
+    with opened(tmp_path / "usual", prepared, CODE):
+        assert not (tmp_path / "usual" / "asp").exists()
+    changed = prepared.by_rules({"domain.lp": "a.", "preferences/sum.lp": "c."})
+    for other in (prepared, changed):
+        with pytest.raises(OtherCampaign), opened(tmp_path / "own", other, CODE):
+            raise AssertionError("other rules must not go on with these results")
+    assert (tmp_path / "own" / "asp" / "preferences" / "sum.lp").read_text() == "b."
+
+
 def test_another_campaigns_folder_is_refused_by_name(tmp_path: Path, prepared: Prepared):
     with opened(tmp_path / "r", prepared, CODE) as store:
         store.put(0, record(), {})

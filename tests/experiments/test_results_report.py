@@ -1,6 +1,7 @@
 """`summary.md` and the figures: what is written is what the trials say."""
 
 import io
+import json
 import os
 import subprocess
 import sys
@@ -348,3 +349,11 @@ def test_a_campaigns_name_stands_beside_the_commands():
     ):
         done = RUNNER.invoke(app, ["experiment", *words])
         assert said in done.output + str(done.exception), words
+
+
+def test_one_campaign_in_two_folders_is_told_apart_by_them(tmp_path: Path) -> None:
+    usual, edge = (results_folder(tmp_path / name, [{"seed": 1}, {"seed": 2}]) for name in "ab")
+    done = RUNNER.invoke(app, ["experiment", "compare", str(usual), str(edge), "--json"])
+    assert done.exit_code == 0
+    told = json.loads(done.stdout)
+    assert (told["a"], told["b"]) == (f"made-up in {usual}", f"made-up in {edge}")

@@ -57,6 +57,80 @@ def test_a_criterion_of_ones_own(copy: Path) -> None:
     assert "reckless" in load_knowledge(copy).criteria
 
 
+NO_WORDS = "forbidden(reach(A,B),never) :- reachable(A,B).\n"
+
+
+@pytest.mark.parametrize(
+    ("rule", "name"),
+    [
+        (NO_WORDS, "never"),
+        # One that does not bite in the tiny scene by which rules are tried out.
+        ("forbidden(reach(A,B),late) :- reachable(A,B), B = b(9,9).\n", "late"),
+        ("#program step(t).\nforbidden(pull,A,idle,t) :- in_hand(start,A,t).\n", "idle"),
+    ],
+)
+def test_a_rule_that_nothing_declares_is_refused_for_it_would_not_count(
+    copy: Path, rule: str, name: str
+) -> None:
+    constraints = copy / "constraints.lp"
+    begun = constraints.read_text() + "#program base.\n"
+    constraints.write_text(begun + rule)
+    with pytest.raises(KnowledgeFault, match=f"add `rule.{name}.[.]` to part base") as told:
+        load_knowledge(copy)
+    assert told.value.file == str(constraints)
+    assert told.value.line == begun.count("\n") + rule.count("\n")
+    # What a log holds was taken by those of its time, and is derived as it was.
+    files = {str(one.relative_to(copy)): one.read_text() for one in copy.rglob("*.lp")}
+    assert attached_knowledge(files, "a.mcap").files == files
+    constraints.write_text(begun + f"rule({name}).\n" + rule)
+    assert load_knowledge(copy).files
+
+
+def test_a_rule_without_words_is_blamed_by_its_name(copy: Path) -> None:
+    with (copy / "constraints.lp").open("a") as file:
+        file.write("#program base.\nrule(never).\n" + NO_WORDS)
+    names, rows = ["b(1,1)", "b(1,2)"], [(0, 0, 0), (0, 0.01, 0)]
+    statics = [f"reachable(psm1,{name})" for name in names]
+    planner = Planner(load_knowledge(copy), PlanningScene.make(names, rows, (0, 0.01, 0), statics))
+    none = planner.plan([]).no_plan
+    assert none is not None
+    assert "Rule: never, for which words.lp has no words." in none.sentences
+    why_not = planner.why_not("reach(psm1,b(1,1))", [])
+    assert "Rule: never, for which words.lp has no words." in why_not.sentences
+
+
+@pytest.mark.parametrize(
+    ("made", "problem"), [(False, "there is no such folder"), (True, "no domain.lp here")]
+)
+def test_a_folder_without_rules_is_told_what_belongs_there(
+    tmp_path: Path, made: bool, problem: str
+) -> None:
+    folder = tmp_path / "rules"
+    if made:
+        folder.mkdir()
+    with pytest.raises(KnowledgeFault, match=problem) as told:
+        load_knowledge(folder)
+    assert "a whole copy of asp/" in str(told.value)
+    assert "mend the rule" not in str(told.value)
+
+
+@pytest.mark.parametrize(
+    ("rule", "said"),
+    [
+        ("rule(never)\n% a remark\nrule(late).\n", "the rule before lacks its full stop"),
+        ("forbidden(reach(A,B),foo) :- reachable(A,_).\n", "a condition of the rule"),
+        ("forbidden(reach(A,B),try_once) :- reacheable(A,B).\n", "misspelt"),
+    ],
+)
+def test_what_clingo_says_is_told_with_what_is_likely(copy: Path, rule: str, said: str) -> None:
+    with (copy / "constraints.lp").open("a") as file:
+        file.write("#program base.\n" + rule)
+    with pytest.raises(KnowledgeFault, match=said) as told:
+        load_knowledge(copy)
+    assert "<block>" not in str(told.value)
+    assert "#inc" not in str(told.value)
+
+
 @pytest.mark.parametrize(
     ("file", "rule", "says"),
     [

@@ -225,7 +225,10 @@ def test_a_horizon_too_short(knowledge: Knowledge, scene: PlanningScene) -> None
     none = Planner(knowledge, scene, "weighted", horizon=2).plan([]).no_plan
     assert none is not None
     assert none.sentences[0] == "No plan of at most 2 actions reaches the goal."
-    assert none.sentences[-1] == "3 candidate blocks are left, but 2 actions are too few."
+    assert none.sentences[-1] == (
+        "3 candidate blocks are left, but 2 actions are too few, or a rule without a name forbids "
+        "what it would take."
+    )
 
 
 def test_each_core_is_needed_whole(knowledge: Knowledge, make_scene: SceneMaker) -> None:

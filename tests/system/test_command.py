@@ -350,8 +350,10 @@ def test_closed_terminal_ends_a_trial_by_rules_of_ones_own_in_order(
     assert plans[0].actions[0].text != plans[1].actions[0].text
     (rules / "goal.lp").write_text("#program check(t).\nfoo(\n")
     faulty = fras("run", "a", "--out", "faulty", "--asp-dir", "rules")
-    assert faulty.end() == 3
-    assert "rules/goal.lp:2: error: syntax error" in faulty.text
+    # Before anything starts.
+    assert faulty.end() == 2
+    assert "rules/goal.lp:2: syntax error" in faulty.text
+    assert "died" not in faulty.text
 
 
 def test_stop_reaches_the_stack_that_a_run_started_for_itself(

@@ -71,3 +71,18 @@ def test_a_trial_runs_with_the_smallest_bridge(tmp_path: Path) -> None:
     )
     assert done.returncode == 0, done.stdout + done.stderr
     assert "The region of interest is exposed." in done.stdout
+
+
+def test_of_a_cut_log_the_stock_reader_tells_what_makes_it_whole(
+    quiet: Path, tmp_path: Path
+) -> None:
+    whole = quiet / "audit.mcap" if quiet.is_dir() else quiet
+    (tmp_path / "audit.mcap").write_bytes(whole.read_bytes()[: whole.stat().st_size // 2])
+    done = subprocess.run(
+        [sys.executable, str(EXAMPLES / "read_log.py"), str(tmp_path)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr.strip().endswith("fras log recover makes it whole")

@@ -5,6 +5,8 @@ from fras_cli.confirm import NoTerminal
 from fras_cli.keep import DownTimeout
 from fras_cli.keys import BadKeys, KeysExist
 from fras_cli.log_export import NoFormat
+from fras_cli.log_verify import NotAHead
+from fras_cli.own_rules import UnusableRules
 from fras_cli.patient import NoPatient
 from fras_cli.run import (
     EXIT_BAD_INPUT,
@@ -66,6 +68,7 @@ BAD_INPUT = (
     NoLog,
     NoPatient,
     NoTerminal,
+    NotAHead,
     NothingOnHost,
     OtherRules,
     OutputExists,
@@ -74,6 +77,7 @@ BAD_INPUT = (
     ScenarioError,
     UnknownHost,
     UnknownService,
+    UnusableRules,
 )
 STACK_ERRORS = (
     CommandNotFound,

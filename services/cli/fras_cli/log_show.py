@@ -24,6 +24,10 @@ class NoSuchKey(FrasError):
     """The log holds no message of that key. Attributes: ``key``."""
 
 
+class NoSuchTicks(FrasError):
+    """The log holds no message of that key in these ticks. Attributes: ``key``."""
+
+
 def show_log(
     path: Path,
     key: str,
@@ -52,8 +56,12 @@ def show_log(
     NoSuchLog, NotAnMcap
     NoSuchKey
         Names the keys that there are.
+    NoSuchTicks
+        Names the ticks that the key has.
     """
     keys: set[str] = set()
+    ticks: list[int] = []
+    shown = 0
     for event in scan_log(path):
         if isinstance(event, Broken | Cut):
             console.print(f"damaged at offset {event.offset}: {escape(event.text)}", style="red")
@@ -65,10 +73,12 @@ def show_log(
         content = _decode(event.payload)
         header = read_header(event.payload)
         tick = header.tick if header is not None else -1
+        ticks.append(tick)
         if (first_tick is not None and tick < first_tick) or (
             last_tick is not None and tick > last_tick
         ):
             continue
+        shown += 1
         if as_json:
             print(json.dumps(_plain(content)))
         else:
@@ -77,6 +87,11 @@ def show_log(
     if key not in keys:
         known = ", ".join(sorted(keys)) or "none at all"
         raise NoSuchKey(f"{path} holds no message of {key!r}; its keys: {known}", key=key)
+    if not shown:
+        there = f"{min(ticks)} to {max(ticks)}"
+        raise NoSuchTicks(
+            f"{path} holds no message of {key!r} in these ticks; it has {there}", key=key
+        )
 
 
 def _decode(payload: bytes) -> Any:

@@ -20,9 +20,15 @@ from fras_log import Verification, verify_file
 from fras_log.attachments import read_attachments, rules_in
 from fras_log.keys import trusted_keys
 
+HEAD = re.compile("[0-9a-f]{64}")
+
 
 class LogIncomplete(FrasError):
     """A log that lacks what led to an action. Attributes: ``goal_id``."""
+
+
+class NotAHead(FrasError):
+    """What was given as a head can't be one. Attributes: ``head``."""
 
 
 def verify_log(
@@ -53,14 +59,23 @@ def verify_log(
 
     Raises
     ------
+    NotAHead
+        A head is given, and not whole.
     NoSuchLog, NotAnMcap, ForeignLog, BadKey
         There is nothing to verify, or nothing to verify it with.
     LogIncomplete
         If the context or the plan behind an action is not in an intact log.
     """
+    noted = head.strip().lower()
+    if noted and not HEAD.fullmatch(noted):
+        raise NotAHead(
+            f"--head {head!r} has {len(noted)} characters: a head is 64 hexadecimal digits, all of "
+            "those that stood at the trial's end",
+            head=head,
+        )
     trusted = trusted_keys(keys)
     with read_progress(console, "verifying") as progress:
-        found = verify_file(path, trusted, head.strip().lower(), progress)
+        found = verify_file(path, trusted, noted, progress)
     _print_file(found, console)
     try:
         kept = _verify_trial(path, asp_dir, console)

@@ -67,6 +67,9 @@ def parse_mesh(text: str) -> list[int]:
     return [int(part) for part in parts]
 
 
+RANGE = "a range such as 1..20"
+
+
 def parse_seeds(text: str) -> range:
     """Seeds from `A..B`, both included.
 
@@ -76,8 +79,12 @@ def parse_seeds(text: str) -> range:
         If that is no range.
     """
     first, dots, last = text.partition("..")
-    if not dots or not first.isdigit() or not last.isdigit() or int(last) < int(first):
-        raise ScenarioError(COMMAND_LINE, "--seeds", text, "a range such as 1..20")
+    if not dots or not first.isdigit() or not last.isdigit():
+        allowed = f"a range such as 1..20; one alone is {text}..{text}" if text.isdigit() else RANGE
+        raise ScenarioError(COMMAND_LINE, "--seeds", text, allowed)
+    if int(last) < int(first):
+        turned = f"the smaller one comes first: {last}..{first}"
+        raise ScenarioError(COMMAND_LINE, "--seeds", text, turned)
     return range(int(first), int(last) + 1)
 
 

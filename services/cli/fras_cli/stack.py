@@ -11,6 +11,7 @@ from fras_cli import runtime
 from fras_cli.absence import Absence
 from fras_cli.link import NAME, Link, identity_for
 from fras_cli.own_keys import ready_keys, require_keys
+from fras_cli.own_rules import read_rules
 from fras_cli.patient import require_process
 from fras_common.errors import FrasError
 from fras_common.identity import default_keys_dir
@@ -94,6 +95,7 @@ class Layout:
             See `fras_supervisor.place`.
         OtherRules
             The rules are for a planner that is not here.
+        UnusableRules
         """
         table, routers = self.table(), {}
         if self.host or self.addresses:
@@ -106,6 +108,7 @@ class Layout:
                 f"--asp-dir {self.asp_dir}, or give it where the planner is",
                 cell="",
             )
+        read_rules(self.asp_dir)
         rules = str(self.asp_dir.resolve())
         return table.with_arguments("planner", "--asp-dir", rules), routers
 

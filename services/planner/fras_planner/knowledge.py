@@ -8,8 +8,10 @@ from fras_common.digests import rules_digest
 from fras_common.errors import FrasError
 from fras_common.shipped import shipped_places
 from fras_planner.planning import Knowledge, KnowledgeFault, Planner, PlanningScene
+from fras_planner.planning.naming import refuse_undeclared
 
 # In comments, too: what is a comment is clingo's to say, and rules may come from anywhere.
+WHOLE_COPY = "rules are a whole copy of asp/, with what you changed in it"
 _OUTSIDE = re.compile(r"#\s*(include|script|begin_lua|begin_python)\b")
 
 
@@ -42,7 +44,10 @@ def load_knowledge(asp_dir: Path | None = None) -> Knowledge:
     folder = next((place for place in places if (place / "domain.lp").is_file()), None)
     if folder is None:
         looked = " or ".join(str(place) for place in places)
-        raise KnowledgeFault(looked, 0, "no domain.lp here")
+        problem = (
+            "no domain.lp here" if any(map(Path.is_dir, places)) else "there is no such folder"
+        )
+        raise KnowledgeFault(looked, 0, problem, WHOLE_COPY)
     files: dict[str, str] = {}
     for path in sorted(folder.rglob("*.lp")):
         name = path.relative_to(folder).as_posix()
@@ -50,7 +55,9 @@ def load_knowledge(asp_dir: Path | None = None) -> Knowledge:
             files[name] = path.read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError) as error:
             raise KnowledgeFault(str(path), 0, f"can't be read: {error}") from error
-    return _checked(files, str(folder))
+    knowledge, rules = _checked(files, str(folder))
+    refuse_undeclared(knowledge, rules)
+    return knowledge
 
 
 def attached_knowledge(files: Mapping[str, str], log: str) -> Knowledge:
@@ -68,17 +75,16 @@ def attached_knowledge(files: Mapping[str, str], log: str) -> Knowledge:
     AttachedRulesUnusable
     """
     try:
-        return _checked(files, "asp")
+        return _checked(files, "asp")[0]
     except KnowledgeFault as error:
         raise AttachedRulesUnusable(log, error) from error
 
 
-def _checked(files: Mapping[str, str], origin: str) -> Knowledge:
+def _checked(files: Mapping[str, str], origin: str) -> tuple[Knowledge, frozenset[str]]:
     for name, text in files.items():
         _refuse_outside(f"{origin}/{name}", text)
     knowledge = Knowledge(files, rules_digest(files), origin=origin)
-    _try_out(knowledge)
-    return knowledge
+    return knowledge, _try_out(knowledge)
 
 
 def _refuse_outside(file: str, text: str) -> None:
@@ -89,17 +95,27 @@ def _refuse_outside(file: str, text: str) -> None:
         raise KnowledgeFault(file, line, problem)
 
 
-def _try_out(knowledge: Knowledge) -> None:
-    """Plan in a tiny scene with each criterion, so that a fault shows before a trial does."""
+def _try_out(knowledge: Knowledge) -> frozenset[str]:
+    """Plan in a tiny scene with each criterion, so that a fault shows before a trial does.
+
+    Returns
+    -------
+    frozenset of str
+        Names of the rules that were enforced.
+    """
     if not knowledge.criteria:
         raise KnowledgeFault(f"{knowledge.origin}/preferences", 0, "no criterion here")
     names, rows = ("b(1,1)", "b(1,2)"), ((0.0, 0.0, 0.0), (0.0, 0.01, 0.0))
     statics = ["reachable(psm1,b(1,1))", "fixed(b(1,2))", "above_roi(b(1,2))"]
     scene = PlanningScene.make(names, rows, (0.0, 0.01, 0.0), statics)
+    rules: frozenset[str] = frozenset()
     for criterion in knowledge.criteria:
         try:
-            Planner(knowledge, scene, criterion).plan([])
+            planner = Planner(knowledge, scene, criterion)
+            planner.plan([])
+            rules |= planner.rules
         except (RuntimeError, ValueError, LookupError) as error:
             # clingo's, where a name stands in place of a number, or the other way round.
             problem = f"a plan by {criterion} can't be told: an atom is not of its form ({error})"
             raise KnowledgeFault(knowledge.origin, 0, problem) from error
+    return rules

@@ -9,7 +9,7 @@ import typer
 from typer.core import TyperGroup
 
 from fras_cli.commands.results import results_app
-from fras_cli.commands.shared import Mesh, console
+from fras_cli.commands.shared import AspDir, Mesh, console
 
 
 class CampaignOrCommand(TyperGroup):
@@ -59,6 +59,7 @@ def run(
         typer.Option(help="A Dask cluster's workers instead.", metavar="tcp://HOST:PORT"),
     ] = None,
     mesh: Mesh = None,
+    asp_dir: AspDir = None,
     keep_logs: Annotated[KeepLogs, typer.Option(help="Of which trials.")] = KeepLogs.FAILED,
     again: Annotated[
         bool, typer.Option("--again", help="Run those that were aborted once more, too.")
@@ -91,6 +92,7 @@ def run(
             workers=workers,
             scheduler=scheduler,
             mesh=mesh,
+            asp_dir=asp_dir,
             keep=keep_logs.value,
             again=again,
             out=out,

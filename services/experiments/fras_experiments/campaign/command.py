@@ -46,6 +46,7 @@ def experiment(
     workers: int,
     scheduler: str | None,
     mesh: str | None,
+    asp_dir: Path | None,
     keep: Keep,
     again: bool,
     out: Path | None,
@@ -59,13 +60,16 @@ def experiment(
 
     Raises
     ------
-    BadCampaign, ScenarioError, FolderInUse, StoreUnwritable
+    BadCampaign, ScenarioError, UnusableRules, FolderInUse, StoreUnwritable
     DeadScheduler, NoWorker, WorkerUnable
     """
     if name == FAULTS:
+        if asp_dir is not None:
+            problem = f"{FAULTS} tries the rules supplied"
+            raise ScenarioError(COMMAND_LINE, "--asp-dir", str(asp_dir), problem)
         return _faults(seeds, workers, scheduler, mesh, out)
     console = Console()
-    prepared = prepare(name, seeds=seeds, mesh=mesh)
+    prepared = prepare(name, seeds=seeds, mesh=mesh, asp_dir=asp_dir)
     folder = (out or default_out(prepared.campaign.name)).resolve()
     with opened(folder, prepared, code_version()) as store, caught_interrupts() as interrupts:
         found = store.load()

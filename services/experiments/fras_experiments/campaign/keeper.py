@@ -6,9 +6,11 @@ import shutil
 import signal
 import threading
 import time
+from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Final
 
 import msgspec
@@ -32,6 +34,7 @@ from fras_experiments.campaign.records import (
     without_result,
 )
 from fras_experiments.campaign.spec import Until
+from fras_experiments.campaign.store import lay_out_rules
 from fras_experiments.following import LOG, follow_to_end, lay_out
 
 READY_S: Final = 60.0
@@ -101,14 +104,27 @@ class Keeper(WorkerPlugin):
         Digest of the code that is to compute.
     own : bool
         Whether the worker is ours, and a Ctrl-C at the terminal not meant for it.
+    rules : mapping of str to str
+        Of the planner, where they are not those supplied: text by path.
     """
 
-    def __init__(self, name: str, mesh: bytes, keep: str, code: str, *, own: bool) -> None:
+    def __init__(
+        self,
+        name: str,
+        mesh: bytes,
+        keep: str,
+        code: str,
+        *,
+        own: bool,
+        rules: Mapping[str, str] = MappingProxyType({}),
+    ) -> None:
         self.name = name
         self._mesh = mesh
         self._keep = keep
         self._code = code
         self._own = own
+        # A mapping proxy does not travel.
+        self._rules = dict(rules)
         self._over = False
         self._lives = 0
         self._held: _Held | None = None
@@ -227,6 +243,7 @@ class Keeper(WorkerPlugin):
             self._close()
         if self._held is not None and patient and not self._held.patient:
             self._close()
+        rules = lay_out_rules(self._folder / "asp", self._rules) if self._rules else None
         for last in (False, True):
             if self._held is not None:
                 break
@@ -240,7 +257,7 @@ class Keeper(WorkerPlugin):
                         None,
                         logs,
                         cancelled=lambda: self._over,
-                        layout=Layout(patient=patient),
+                        layout=Layout(asp_dir=rules, patient=patient),
                     )
                 )
             except FrasError:

@@ -1,8 +1,9 @@
 """A campaign as a file, and those that come with FRAS."""
 
+import hashlib
 import tomllib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, cast
 
@@ -11,6 +12,8 @@ import tomlkit
 
 from fras_cli.mesh_input import mesh_path, read_mesh_file
 from fras_cli.options import find_scenario, parse_mesh, parse_seeds
+from fras_cli.own_rules import read_rules
+from fras_common.digests import rules_digest
 from fras_common.files import TEXT_BYTES, read_at_most
 from fras_common.scenario import Scenario, ScenarioError, load
 from fras_experiments.campaign.spec import (
@@ -70,6 +73,8 @@ class Prepared:
         Content of its mesh file, if it has one.
     digest : str
         Over all that is asked for.
+    rules : mapping of str to str
+        Text of the planner's rules by path, where they are not those supplied.
     """
 
     campaign: Campaign
@@ -77,6 +82,12 @@ class Prepared:
     mesh: bytes
     trials: tuple[TrialSpec, ...]
     digest: str
+    rules: Mapping[str, str] = field(default_factory=dict[str, str])
+
+    def by_rules(self, rules: Mapping[str, str]) -> "Prepared":
+        """Return the same trials planned by other rules: another campaign to a results folder."""
+        digest = hashlib.sha256(f"{self.digest} {rules_digest(rules)}".encode()).hexdigest()
+        return replace(self, rules=rules, digest=digest)
 
 
 def shipped() -> dict[str, Path]:
@@ -125,9 +136,9 @@ def read_campaign(path: Path) -> Campaign:
         file = msgspec.convert(raw, _File)
     except msgspec.ValidationError as error:
         raise _explained(error, raw, path) from error
-    for field, values in file.sweep.items():
+    for swept, values in file.sweep.items():
         if not isinstance(values, list):
-            raise BadCampaign(str(path), f"sweep.{field}", values, "a list of the values to try")
+            raise BadCampaign(str(path), f"sweep.{swept}", values, "a list of the values to try")
     head = file.campaign
     return Campaign(
         name=head.name,
@@ -143,12 +154,18 @@ def read_campaign(path: Path) -> Campaign:
     )
 
 
-def prepare(text: str, *, seeds: str | None = None, mesh: str | None = None) -> Prepared:
+def prepare(
+    text: str,
+    *,
+    seeds: str | None = None,
+    mesh: str | None = None,
+    asp_dir: Path | None = None,
+) -> Prepared:
     """Read a campaign, lay the command line's options over it, list its trials.
 
     Raises
     ------
-    BadCampaign, ScenarioError, NoRoomForRoi
+    BadCampaign, ScenarioError, NoRoomForRoi, UnusableRules
     """
     path = find_campaign(text)
     campaign = read_campaign(path)
@@ -160,7 +177,8 @@ def prepare(text: str, *, seeds: str | None = None, mesh: str | None = None) -> 
             raise BadCampaign(str(path), "--mesh", mesh, problem)
         fields = {**campaign.set, MESH: parse_mesh(mesh)}
         campaign = replace(campaign, set=fields)
-    return prepared(campaign, text if path in shipped().values() else str(path))
+    asked = prepared(campaign, text if path in shipped().values() else str(path))
+    return asked if asp_dir is None else asked.by_rules(read_rules(asp_dir))
 
 
 def prepared(campaign: Campaign, where: str) -> Prepared:

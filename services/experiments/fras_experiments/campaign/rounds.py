@@ -57,7 +57,14 @@ class Round:
         StoreUnwritable
         """
         name = f"campaign-{uuid.uuid4().hex[:8]}"
-        keeper = Keeper(name, self.prepared.mesh, self.keep, code_digest(), own=cluster.own)
+        keeper = Keeper(
+            name,
+            self.prepared.mesh,
+            self.keep,
+            code_digest(),
+            own=cluster.own,
+            rules=self.prepared.rules,
+        )
         until = self.prepared.campaign.until
         tasks = {
             number: Task(name, number, msgspec.json.encode(one.scenario), until)

@@ -22,6 +22,7 @@ from fras_experiments.campaign.records import Record, key_of
 
 CAMPAIGN: Final = "campaign.toml"
 BASE: Final = "base.toml"
+RULES: Final = "asp"
 PART: Final = ".part"
 FULL: Final = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
@@ -208,9 +209,19 @@ def _begin(folder: Path, prepared: Prepared, code: str) -> None:
     _write(folder / CAMPAIGN, to_toml(campaign, noted).encode())
 
 
+def lay_out_rules(folder: Path, rules: Mapping[str, str]) -> Path:
+    """Write rules into a folder that `--asp-dir` takes; return it."""
+    for name, text in rules.items():
+        file = folder / name
+        file.parent.mkdir(parents=True, exist_ok=True)
+        _write(file, text.encode(), sync=False)
+    return folder
+
+
 def _complete(folder: Path, prepared: Prepared) -> None:
-    """Write the base scenario beside, if whoever began the folder was killed before."""
+    """Write base scenario and rules beside, if whoever began the folder was killed before."""
     (folder / "records").mkdir(exist_ok=True)
+    lay_out_rules(folder / RULES, prepared.rules)
     if (folder / BASE).exists():
         return
     base = prepared.base

@@ -117,6 +117,9 @@ def compare_campaigns(
     except BadResults as error:
         return _refused(error)
     names = _name(ours, where_first), _name(others, where_second)
+    if names[0] == names[1]:
+        # One campaign by other rules, or other code: only the folders tell which is which.
+        names = f"{names[0]} in {first}", f"{names[1]} in {second}"
     if as_json:
         sys.stdout.write(json.dumps(as_plain(comparison, *names, seed), indent=2) + "\n")
     else:

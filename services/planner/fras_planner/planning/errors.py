@@ -24,17 +24,26 @@ class PlanningError(FrasError):
     """Base of all that the planner refuses."""
 
 
+MEND_THE_RULE = "mend the rule, or leave out --asp-dir for the knowledge supplied"
+
+
 class KnowledgeFault(PlanningError):
-    """A rule file is missing, or clingo does not understand it."""
+    """A rule file is missing, or clingo does not understand it.
+
+    Parameters
+    ----------
+    remedy : str
+        What to do; only told.
+    """
 
     file: str
     line: int
     message: str
 
-    def __init__(self, file: str, line: int, message: str) -> None:
+    def __init__(self, file: str, line: int, message: str, remedy: str = MEND_THE_RULE) -> None:
         place = f"{file}:{line}" if line else file
         super().__init__(
-            f"{place}: {message}; mend the rule, or leave out --asp-dir for the knowledge supplied",
+            f"{place}: {message}; {remedy}",
             file=file,
             line=line,
             message=message,

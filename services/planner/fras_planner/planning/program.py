@@ -17,8 +17,16 @@ WHY_NOT_BLOCK_FILES = ("words.lp", "why_not_block.lp")
 WHY_NOT_ACTION_FILES = ("words.lp", "why_not_action.lp")
 VERIFY_FILES = ("verify.lp",)
 PREFERENCES = "preferences/"
+HINTS = {
+    "syntax error": "often the rule before lacks its full stop",
+    "unsafe variables": "each variable has to stand in a condition of the rule that is not negated",
+    "atom does not occur in any rule head": "misspelt, or with another number of arguments?",
+}
+"""What is likely, by how clingo's message begins."""
 
 _PLACE = re.compile(r"<block>:(\d+):[^ ]*\s*(.*)", re.DOTALL)
+_OWN_PLACE = re.compile(r" <block>:[0-9:-]+: note: ")
+_OWN_PART = re.compile(r"\[#inc_[a-z_]+\];?|#inc_[a-z_]+(?:\([^()]*\))?;")
 
 
 @dataclass(frozen=True)
@@ -154,8 +162,17 @@ class Program:
             # What is open at the end of a file is noticed at the line put before the next one.
             line, (start, name) = line - 1, started[-2]
         # The first line of each file's text is the `#program base.` put before it.
-        words = " ".join(place.group(2).split())
-        raise KnowledgeFault(f"{self._origin}/{name}", line - start, words)
+        raise KnowledgeFault(f"{self._origin}/{name}", line - start, _in_words(place.group(2)))
+
+
+def _in_words(said: str) -> str:
+    """Take out of what clingo says what only clingo knows, and put in what it leaves unsaid."""
+    words = " ".join(said.split()).removeprefix("error: ").removeprefix("info: ")
+    words = _OWN_PART.sub("", _OWN_PLACE.sub(" ", words))
+    for begins, hint in HINTS.items():
+        if words.startswith(begins):
+            return f"{words} ({hint})"
+    return words
 
 
 def _keeping(messages: list[str]) -> Callable[[clingo.MessageCode, str], None]:

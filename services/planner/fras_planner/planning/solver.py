@@ -120,6 +120,11 @@ class Planner:
         self._assumptions = list(self._rules.values())
         self._ground_s = clock() - began
 
+    @property
+    def rules(self) -> frozenset[str]:
+        """Names of the rules that it enforces."""
+        return frozenset(self._rules)
+
     def plan(
         self,
         fluents: Iterable[str],
