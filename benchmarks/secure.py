@@ -16,9 +16,10 @@ import numpy as np
 from benchmarks.loop import Floats, overhead_ms, percentiles
 from benchmarks.telling import tell_figures
 
+from fras_cli.layout import USUAL, Layout
 from fras_cli.options import build_scenario
 from fras_cli.report import read_trial
-from fras_cli.stack import USUAL, Layout, UsedStack, own_stack
+from fras_cli.stack import UsedStack, own_stack
 from fras_cli.trial import TrialFollower
 
 TARGET = 1.3

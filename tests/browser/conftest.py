@@ -10,7 +10,8 @@ from benchmarks.surgeon import Served, SurgeonsPage, served
 from benchmarks.theatre import Theatre
 from playwright.sync_api import Browser
 
-from fras_cli.stack import Layout, own_stack
+from fras_cli.layout import Layout
+from fras_cli.stack import own_stack
 from support.tables import table_with
 
 REQUIRED = "FRAS_BROWSER"

@@ -6,7 +6,7 @@ import time
 import pytest
 
 from fras_cli.far_routers import AFTER_S, EVERY_S, HEARD_AFTER_S, FarRouters, obstacle
-from fras_cli.stack import Layout
+from fras_cli.layout import Layout
 
 
 def test_a_place_that_nobody_listens_at_is_told_with_its_port():

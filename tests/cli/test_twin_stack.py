@@ -5,9 +5,9 @@ from typing import Any, cast
 
 import pytest
 
+from fras_cli.layout import USUAL, Layout
 from fras_cli.link import Link
 from fras_cli.patient import NoPatient, require_ready
-from fras_cli.stack import USUAL, Layout
 from fras_supervisor import find_table, load_table
 from fras_supervisor.producers import service_of
 

@@ -6,8 +6,8 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from fras_cli.layout import Layout, layout_of
 from fras_cli.own_keys import require_keys
-from fras_cli.stack import Layout, layout_of
 from fras_supervisor import TableError, find_table, load_table
 from fras_supervisor.table import PLACEHOLDERS, parse_table
 

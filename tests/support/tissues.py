@@ -44,7 +44,11 @@ def tissue(tick: int, force_n: float = 0.0, converged: bool = True, **header: An
 
 
 def let_alone(
-    tick: int, nodes_m: NDArray[np.float64], force_n: NDArray[np.float64], **fields: Any
+    tick: int,
+    nodes_m: NDArray[np.float64],
+    force_n: NDArray[np.float64],
+    grasped: dict[str, list[int]] | None = None,
+    **fields: Any,
 ) -> TissueState:
     """Tissue of whatever shape that no arm holds, as it stands in a log made by hand."""
     return TissueState(
@@ -53,6 +57,7 @@ def let_alone(
         nodal_force_n=Array.of(force_n, "<f4"),
         max_node_speed_m_s=0.0,
         tool_force_n={},
+        grasped=grasped if grasped is not None else {},
         grasped_force_n={},
         patch_force_n=Array.of(np.zeros((1, 3)), "<f4"),
         balance_residual_n=0.0,
@@ -60,7 +65,7 @@ def let_alone(
             iterations=2, residual=1e-9, refactored=False, wall_s=0.002, converged=True,
             inverted_elements=0,
         ),
-        **{"grasped": {}, **fields},
+        **fields,
     )  # fmt: skip
 
 

@@ -14,9 +14,10 @@ import psutil
 import pytest
 
 from fras_cli.app import main
+from fras_cli.layout import Layout
 from fras_cli.options import build_trial
 from fras_cli.report import Summary, read_trial, summarise
-from fras_cli.stack import Layout, UsedStack, own_stack
+from fras_cli.stack import UsedStack, own_stack
 from fras_cli.trial import TrialFollower, TrialView
 from fras_common.scenario import Scenario
 

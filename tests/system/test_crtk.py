@@ -16,9 +16,10 @@ import psutil
 import pytest
 
 from fras_audit import SERVICES, audit_log
+from fras_cli.layout import Layout
 from fras_cli.options import build_trial
 from fras_cli.report import Summary, read_trial, summarise
-from fras_cli.stack import Layout, UsedStack, own_stack
+from fras_cli.stack import UsedStack, own_stack
 from fras_cli.trial import TrialFollower, TrialView
 from fras_common.messages import HoldRequest, Pose, ResumeRequest, RobotState, ServoJoints
 from fras_common.topics import CRTK, HOLD, RESUME

@@ -16,10 +16,11 @@ from rich.console import Console
 from fras_audit import Report, Tally, audit_log
 from fras_audit.decisions import decide_by
 from fras_audit.reading import read_recorded
+from fras_cli.layout import Layout
 from fras_cli.log_extract import extract
 from fras_cli.log_verify import verify_log
 from fras_cli.options import build_trial
-from fras_cli.stack import Layout, own_stack
+from fras_cli.stack import own_stack
 from fras_cli.trial import TrialFollower, TrialView
 from fras_common.bus import RawSample
 from fras_common.codec import decode, encode

@@ -12,9 +12,10 @@ from typing import Any
 import psutil
 import pytest
 
+from fras_cli.layout import Layout
 from fras_cli.link import Link
 from fras_cli.options import build_trial
-from fras_cli.stack import Layout, UsedStack, own_stack
+from fras_cli.stack import UsedStack, own_stack
 from fras_cli.trial import TrialFollower
 from fras_common.bus import RemoteFault
 from fras_common.messages import (

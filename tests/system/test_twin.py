@@ -12,9 +12,10 @@ import pytest
 
 from fras_audit import SERVICES, audit_log
 from fras_audit.reading import read_recorded
+from fras_cli.layout import Layout
 from fras_cli.options import build_trial
 from fras_cli.report import PatientSummary, Summary, read_trial, summarise
-from fras_cli.stack import Layout, own_stack
+from fras_cli.stack import own_stack
 from fras_cli.trial import TrialFollower, TrialView
 from fras_common.messages import TissueState, Verdict
 from fras_common.scenario import patient_scenario

@@ -4,6 +4,7 @@ from fras_cli.audit import UnknownService
 from fras_cli.confirm import NoTerminal
 from fras_cli.keep import DownTimeout
 from fras_cli.keys import BadKeys, KeysExist
+from fras_cli.layout import OtherRules
 from fras_cli.log_export import NoFormat
 from fras_cli.log_verify import NotAHead
 from fras_cli.own_rules import UnusableRules
@@ -17,7 +18,7 @@ from fras_cli.run import (
 )
 from fras_cli.runtime import BadCell, BadRuntimeFolder, NoStack, SeveralStacks, StackExists
 from fras_cli.service_logs import NoLog
-from fras_cli.stack import OtherRules, StackIncomplete
+from fras_cli.stack import StackIncomplete
 from fras_cli.trial import NobodyRunsTrials, StackDied, TrialRefused
 from fras_cli.viewing import NoPage
 from fras_common.bus import NoAnswer

@@ -11,11 +11,12 @@ from rich.markup import escape
 
 from fras_cli import runtime
 from fras_cli.far_routers import FarRouters
+from fras_cli.layout import USUAL, Layout
 from fras_cli.link import Link
 from fras_cli.other_hosts import OtherHosts
 from fras_cli.plan_words import HOLDER
 from fras_cli.run import EXIT_OK, EXIT_STACK, caught_interrupts, supervisor_lines
-from fras_cli.stack import USUAL, Layout, own_stack
+from fras_cli.stack import own_stack
 from fras_common.errors import FrasError
 from fras_common.messages import HoldRequest, HoldState, ResumeRequest, WhyNotRequest
 from fras_common.topics import HOLD, RESUME, WHY_NOT

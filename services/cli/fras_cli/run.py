@@ -16,9 +16,10 @@ from rich.markup import escape
 
 from fras_cli.confirm import Confirmation
 from fras_cli.display import LiveDisplay, print_summary
+from fras_cli.layout import USUAL, Layout
 from fras_cli.patient import require_ready
 from fras_cli.report import Summary, write_report
-from fras_cli.stack import USUAL, Layout, UsedStack, use_stack
+from fras_cli.stack import UsedStack, use_stack
 from fras_cli.trial import StackDied, TrialFollower, TrialView
 from fras_cli.viewing import Page, view_beside
 from fras_common.bus import NoAnswer

@@ -118,7 +118,7 @@ def export(
 ) -> None:
     """Put what a host needs in a folder: its services' certificates and keys, no others."""
     from fras_cli.keys import export_keys, is_router, issue_keys, look_at_keys
-    from fras_cli.stack import Layout
+    from fras_cli.layout import Layout
 
     place, now = folder_of(folder), datetime.now(UTC)
     needed = [*Layout(compose, keys=place).certificates_of(host), *(also or [])]

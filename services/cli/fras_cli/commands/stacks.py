@@ -78,7 +78,7 @@ def up(
 ) -> None:
     """Start the stack and keep it, for `fras run` and for clients of your own."""
     from fras_cli.keep import up
-    from fras_cli.stack import layout_of
+    from fras_cli.layout import layout_of
     from fras_supervisor.hosts import read_addresses
 
     folder = logs or Path("runs") / f"up-{cell}" / "logs"
@@ -151,7 +151,7 @@ def compose_docker(
     ] = False,
 ) -> None:
     """Print a process table as a Docker Compose file, a container a process."""
-    from fras_cli.stack import Layout
+    from fras_cli.layout import Layout
     from fras_common.extras import require_extra
 
     with require_extra("supervisor"):

@@ -65,9 +65,9 @@ def run(
 ) -> None:
     """Run a trial: the stack of `fras up` if there is one in the cell, else an own one."""
     from fras_cli.confirm import require_terminal
+    from fras_cli.layout import layout_of
     from fras_cli.options import build_trial, choose_seeds
     from fras_cli.run import default_out, run_trials
-    from fras_cli.stack import layout_of
     from fras_cli.viewing import Page
 
     if confirm:

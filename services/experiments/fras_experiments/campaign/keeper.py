@@ -17,9 +17,10 @@ import msgspec
 import psutil
 from distributed import Worker, WorkerPlugin, get_worker
 
+from fras_cli.layout import Layout
 from fras_cli.options import TrialInput
 from fras_cli.report import read_trial
-from fras_cli.stack import Layout, UsedStack, own_stack
+from fras_cli.stack import UsedStack, own_stack
 from fras_cli.trial import TrialFollower, TrialView
 from fras_common.errors import FrasError
 from fras_common.scenario import Scenario

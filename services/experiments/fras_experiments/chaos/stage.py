@@ -5,8 +5,9 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from fras_cli.layout import Layout
 from fras_cli.options import TrialInput
-from fras_cli.stack import Layout, UsedStack, own_stack
+from fras_cli.stack import UsedStack, own_stack
 from fras_cli.trial import TrialFollower
 from fras_experiments.chaos.clocked import set_clock
 from fras_experiments.chaos.faults import VICTIMS, Fault, Kind
