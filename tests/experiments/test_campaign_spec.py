@@ -157,7 +157,7 @@ def test_what_cannot_be_is_named_with_its_place(tmp_path: Path, text: str):
         ('name = "a b"', "name"),
         ('name = "../../etc"', "name"),
         ("", "name"),
-        ('name = "x"\nseeds = "5..3"', "a range such as"),
+        ('name = "x"\nseeds = "5..3"', "the smaller one comes first: 3..5"),
         ('name = "x"\nseeds = 3', "str"),
         ('name = "x"\nscenario = "nowhere"', "neither a file"),
         ('name = "x"\nscenario = "nowhere.toml"', "can't be read"),

@@ -233,3 +233,10 @@ def test_a_rule_that_puts_a_name_where_a_step_belongs_is_told(copy: Path) -> Non
         file.write("#program history.\nholds(visible_roi,soon).\n")
     with pytest.raises(KnowledgeFault, match="not of its form"):
         load_knowledge(copy)
+
+
+def test_a_file_that_no_plan_needs_is_parsed_as_well(copy: Path) -> None:
+    verify = copy / "verify.lp"
+    verify.write_text(verify.read_text(encoding="utf-8") + "violation(X :- .\n", encoding="utf-8")
+    with pytest.raises(KnowledgeFault, match=r"verify\.lp:\d+: "):
+        load_knowledge(copy)

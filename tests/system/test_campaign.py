@@ -194,7 +194,7 @@ def test_bad_input_is_named_before_anything_starts(
         (["nothing"], 2, "is neither a file nor one of: criteria"),
         ([*SIX[:3], "--out", str(undisturbed)], 2, "holds results of the campaign 'retraction'"),
         (["criteria", "--out", str(undisturbed)], 2, "those of 'criteria' are asked for"),
-        (["retraction", "--seeds", "9..1"], 2, "a range such as"),
+        (["retraction", "--seeds", "9..1"], 2, "the smaller one comes first: 1..9"),
         ([*TWO, "--scheduler", dead, "--out", "x"], 3, "no Dask scheduler answers"),
     ):
         command = fras_here("experiment", *arguments)

@@ -17,7 +17,7 @@ from support.logs import assert_same_trial, messages
 from support.tables import table_with
 
 # A trial without a patient tells of none.
-FIELDS = set(Summary.__struct_fields__) - {"patient"}
+FIELDS = set(Summary.__struct_fields__) - {"patient", "detail"}
 Fras = Callable[..., Any]
 # What is to be seen of the command does not hang on the mesh: a coarse one costs less.
 COARSE = ("--mesh", "11,13,2")

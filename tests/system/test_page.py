@@ -140,7 +140,7 @@ def test_a_trial_with_its_page_shows_itself_and_ends_both_with_its_own_status(
     looker.close()
     # Of the page, and of viser, nothing: what reads this expects a summary alone.
     (line,) = run.output.splitlines()
-    assert set(json.loads(line)) == set(Summary.__struct_fields__) - {"patient"}
+    assert set(json.loads(line)) == set(Summary.__struct_fields__) - {"patient", "detail"}
     assert "viser" not in run.told
 
 

@@ -6,7 +6,7 @@ from typing import Any
 from clingo.ast import ASTType, parse_string
 
 from fras_planner.planning.errors import KnowledgeFault
-from fras_planner.planning.program import Knowledge
+from fras_planner.planning.program import Knowledge, Program
 
 FORBIDDING = {2: 1, 4: 2}
 """Where `forbidden` has the name of its rule, by its number of arguments."""
@@ -18,15 +18,16 @@ def refuse_undeclared(knowledge: Knowledge, declared: Collection[str]) -> None:
     Parameters
     ----------
     knowledge : Knowledge
-        That clingo understands.
     declared : collection of str
         Names of the rules that a planner by it enforces.
 
     Raises
     ------
     KnowledgeFault
-        With the file, the line and the name.
+        With the file, the line and the name; or a file that no plan needs does not parse.
     """
+    for file in knowledge.files:
+        Program(knowledge, (file,), ())
     used = [
         (file, line, name) for file, text in knowledge.files.items() for line, name in _names(text)
     ]
