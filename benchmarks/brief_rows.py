@@ -4,6 +4,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
+from benchmarks.fe import RATIOS, TARGETS
+from benchmarks.fe_mesh import TO_REACH
+from benchmarks.log import EXPORT_S
+
 Figures = Any
 
 
@@ -68,19 +72,12 @@ def _loop(figures: Figures) -> list[Row]:
     ]
 
 
-# As in benchmarks/fe.py.
-_REAL_TIME: Final = {"11x13x2": 10.0, "21x25x2": 4.0}
-_PEERS: Final = {"MuJoCo flex": 1.5, "felupe": 15.0}
-
-
 def _fe(figures: Figures) -> list[Row]:
     rows: list[Row] = []
     for mesh, methods in figures["meshes"].items():
         ours = methods["auto"]
-        rows.append(
-            at_least(f"{mesh}: times real time", ours["real_time_factor"], _REAL_TIME[mesh])
-        )
-        for peer, least in _PEERS.items():
+        rows.append(at_least(f"{mesh}: times real time", ours["real_time_factor"], TARGETS[mesh]))
+        for peer, least in RATIOS.items():
             if "times_fras" in methods.get(peer, {}):
                 text = f"{mesh}: {peer}, times the time of FRAS"
                 rows.append(at_least(text, methods[peer]["times_fras"], least))
@@ -89,7 +86,9 @@ def _fe(figures: Figures) -> list[Row]:
 
 def _mesh(figures: Figures) -> list[Row]:
     worst = max(abs(one["off"]) for scene in figures.values() for one in scene["21x25x3"].values())
-    return [at_most("force on 21x25x3 against 41x49x3, worst", 100.0 * worst, 3.0, "%")]
+    return [
+        at_most("force on 21x25x3 against 41x49x3, worst", 100.0 * worst, 100.0 * TO_REACH, "%")
+    ]
 
 
 def _criteria(figures: Figures) -> list[Row]:
@@ -105,7 +104,7 @@ def _criteria(figures: Figures) -> list[Row]:
 def _recorder(figures: Figures) -> list[Row]:
     return [
         *(Row(what, "", "", met) for what, met in figures["targets"].items()),
-        at_most("memory to verify a log", figures["verify_peak_mib"], 50.0, "MiB"),
+        Row("memory to verify a log [MiB]", f"{figures['verify_peak_mib']:.3g}"),
     ]
 
 
@@ -114,8 +113,8 @@ def _log(figures: Figures) -> list[Row]:
     for name, one in figures["scenarios"].items():
         rows += [
             at_most(f"{name}: audit over the trial's time", one["audit"] / one["trial"], 1.0, ""),
-            at_most(f"{name}: export to Foxglove", one["foxglove"], 10.0, "s"),
-            at_most(f"{name}: export to Rerun", one["rerun"], 10.0, "s"),
+            at_most(f"{name}: export to Foxglove", one["foxglove"], EXPORT_S, "s"),
+            at_most(f"{name}: export to Rerun", one["rerun"], EXPORT_S, "s"),
         ]
     return rows
 

@@ -80,7 +80,7 @@ def parse_seeds(text: str) -> range:
     """
     first, dots, last = text.partition("..")
     if not dots or not first.isdigit() or not last.isdigit():
-        allowed = f"a range such as 1..20; one alone is {text}..{text}" if text.isdigit() else RANGE
+        allowed = f"{RANGE}; one alone is {text}..{text}" if text.isdigit() else RANGE
         raise ScenarioError(COMMAND_LINE, "--seeds", text, allowed)
     if int(last) < int(first):
         turned = f"the smaller one comes first: {last}..{first}"

@@ -64,6 +64,7 @@ class Listener:
     def __init__(self, host: ServiceHost) -> None:
         self._host = host
         self._mail = Mail()
+        self._looked_s = time.monotonic()
         self.picture = Picture()
         bus = host.bus
         topic: Topic[Any]
@@ -89,10 +90,12 @@ class Listener:
 
     def look(self) -> Picture:
         """Take in what has arrived, and return all that is known."""
-        now_s = time.monotonic()
         for recent in self._each_tick:
             for message in recent.take():
-                self._mail.append(message, now_s)
+                # At some time since then: of a state and the holds, which motion says as they
+                # change, what was heard meanwhile is the later word.
+                self._mail.append(message, self._looked_s)
+        self._looked_s = time.monotonic()
         for message, at_s in self._mail.take():
             self.picture = _with(self.picture, message, at_s)
         self._host.counts["received"] = self._mail.received
