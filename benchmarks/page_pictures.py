@@ -16,12 +16,12 @@ from benchmarks.browser import Fence, chromium
 from benchmarks.surgeon import SurgeonsPage, served, served_log
 from benchmarks.theatre import Theatre, eventually
 from PIL import Image
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import Browser, ViewportSize, expect
 
 from fras_cli.stack import own_stack
 
 OUT: Final = Path(__file__).parent.parent / "docs" / "images"
-TABLETS: Final = {
+TABLETS: Final[dict[str, ViewportSize]] = {
     "tablet": {"width": 1024, "height": 768},
     "tablet-upright": {"width": 820, "height": 1180},
 }
@@ -49,7 +49,7 @@ class Camera:
         self._out = out
         self.page = self._open()
 
-    def _open(self, screen: dict[str, int] | None = None) -> SurgeonsPage:
+    def _open(self, screen: ViewportSize | None = None) -> SurgeonsPage:
         page = SurgeonsPage(self._browser, self._address, screen=screen, sharpness=1.0)
         frame = page.page.frame_locator("#scene")
         frame.locator("canvas").first.wait_for()

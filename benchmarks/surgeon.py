@@ -9,18 +9,18 @@ import threading
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO, Any, Final
+from typing import IO, Final
 from urllib.parse import urlencode, urlsplit
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
-from playwright.sync_api import Browser, Page, Route, expect
+from playwright.sync_api import Browser, Page, Route, ViewportSize, expect
 
 from fras_cli.link import Link
 
 PATIENCE_MS: Final = 90_000.0
-SCREENS: Final = {"width": 1280, "height": 800}
+SCREENS: Final[ViewportSize] = {"width": 1280, "height": 800}
 ANNOUNCED: Final = re.compile(r"the surgeon's page: (http\S+)")
 expect.set_options(timeout=PATIENCE_MS)
 SCENE: Final = re.compile(r"/scene/[^/?]+/$")
@@ -124,7 +124,7 @@ class SurgeonsPage:
         Where the page is, token included.
     scene : bool
         False: the scene is left out, which spares a second of computing it.
-    screen : mapping
+    screen : ViewportSize
         Width and height of the window.
     sharpness : float
         Pixels of a picture for each of the window's.
@@ -143,13 +143,13 @@ class SurgeonsPage:
         address: str,
         *,
         scene: bool = True,
-        screen: dict[str, int] | None = None,
+        screen: ViewportSize | None = None,
         sharpness: float = 0.5,
     ) -> None:
         self.errors: list[str] = []
         self._places: list[str] = []
         self._netloc = urlsplit(address).netloc
-        size: Any = screen or SCREENS
+        size = screen or SCREENS
         # A quarter of the pixels: they are computed, and what is read is the text.
         self.context = browser.new_context(viewport=size, device_scale_factor=sharpness)
         self.context.set_default_timeout(PATIENCE_MS)

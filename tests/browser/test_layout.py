@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 from benchmarks.surgeon import Served, SurgeonsPage, differing
 from benchmarks.theatre import Theatre, eventually
-from playwright.sync_api import expect
+from playwright.sync_api import ViewportSize, expect
 
 from fras_common.topics import SERVICES
 
@@ -20,7 +20,7 @@ OTHER_PLACE_PIXELS = 2000
 
 @pytest.mark.parametrize("screen", [{"width": 1280, "height": 800}, {"width": 1024, "height": 768}])
 def test_the_health_of_every_part_is_in_sight_and_told_in_words(
-    theatre: Theatre, server: Served, open_page: OpenPage, screen: dict[str, int]
+    theatre: Theatre, server: Served, open_page: OpenPage, screen: ViewportSize
 ) -> None:
     page = open_page(server.address, scene=False, screen=screen)
     page.is_live()
@@ -49,7 +49,7 @@ def test_the_health_of_every_part_is_in_sight_and_told_in_words(
     ],
 )
 def test_visers_own_panel_covers_nothing_and_opens_no_settings(
-    server: Served, open_page: OpenPage, screen: dict[str, int], panel: str
+    server: Served, open_page: OpenPage, screen: ViewportSize, panel: str
 ) -> None:
     page = open_page(server.address, screen=screen)
     frame = page.page.frame_locator("#scene")

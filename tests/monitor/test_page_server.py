@@ -3,6 +3,7 @@
 import gzip
 import http.client
 import json
+import re
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -125,7 +126,7 @@ def cell(request: pytest.FixtureRequest) -> Iterator[Cell]:
 
 
 def test_the_page_is_served_and_may_contact_nobody_else(cell: Cell):
-    for path in ("", "page.js", "page.css", "plot.js", "scene/"):
+    for path in ("", "page.js", "page.css", "plot.js", "scene/0a1b/"):
         answer = cell.get(path)
         assert answer.status == 200
         rules = answer.headers["Content-Security-Policy"]
@@ -144,10 +145,31 @@ def test_the_scene_comes_without_visers_panel_packed_or_not(cell: Cell):
         assert b"display:none" in head
 
 
+def test_the_scenes_program_is_kept_by_a_browser_and_comes_packed_or_not(cell: Cell):
+    name = re.search(rb'href="../(client-\w+\.js)"', cell.get("scene/0a1b/").body)
+    assert name is not None
+    path = f"scene/{name[1].decode()}"
+    plain = cell.get(path)
+    packed = cell.get(path, **{"Accept-Encoding": "gzip"})
+    assert "immutable" in plain.headers["Cache-Control"]
+    assert "javascript" in plain.headers["Content-Type"]
+    assert gzip.decompress(packed.body) == plain.body
+
+
+def test_each_page_asks_for_a_scene_of_its_own(cell: Cell):
+    bodies = [cell.get("").body for _ in range(2)]
+    scenes = [re.findall(rb'src="(scene/[0-9a-f]{32}/)"', body) for body in bodies]
+    (first,), (second,) = scenes
+    assert first != second
+    assert cell.get(first.decode()).status == 200
+
+
 def test_nothing_else_is_served(cell: Cell):
     for path in (
         "scene/x/",
         "scene/a/b/",
+        "scene/",
+        "scene/client-0.js",
         "page.py",
         "../door.py",
         "scene/../../x",
@@ -208,7 +230,7 @@ def test_a_page_that_vanishes_disturbs_no_other(cell: Cell):
 
 @pytest.mark.parametrize("cell", [Policy(TOKEN, VIEW)], indirect=True)
 def test_without_the_token_there_is_neither_page_nor_socket(cell: Cell):
-    for path in ("", "page.js", "scene/", "?token=wrong"):
+    for path in ("", "page.js", "scene/0a1b/", "?token=wrong"):
         assert cell.get(path).status == 401
     for place in ("control", "scene"):
         address = cell.address.replace("http", "ws") + place

@@ -2,16 +2,15 @@
 
 viser makes its web server itself and offers no place for a token, for pages of ours, or for a
 second web socket. So for the moment in which it does, `websockets`' `serve` is replaced by one that
-puts this door in front of viser's two callbacks. Nothing else of viser is touched.
+puts this door in front of viser's handler and in place of its files. Nothing else is touched.
 """
 
-import gzip
 import re
+import secrets
 import socket
 from collections.abc import Awaitable, Callable, Generator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from functools import lru_cache
 from http import HTTPStatus
 from pathlib import Path
 from typing import Any, Final
@@ -31,6 +30,7 @@ from fras_monitor.access import (
     token_in_cookies,
     token_in_query,
 )
+from fras_monitor.page.client import Text, read_client
 
 WHO: ContextVar[Role] = ContextVar("WHO", default="viewer")
 """What whoever sent the message that is being handled may do."""
@@ -40,12 +40,15 @@ PAGE: ContextVar[str] = ContextVar("PAGE", default="")
 
 CONTROL: Final = "/control"
 SCENE: Final = re.compile(r"/scene(?:/([0-9a-f]{1,32}))?(/?)")
+_HTML: Final = "text/html; charset=utf-8"
+_JAVASCRIPT: Final = "text/javascript; charset=utf-8"
 FILES: Final = {
-    "/": ("page.html", "text/html; charset=utf-8"),
     "/page.css": ("page.css", "text/css; charset=utf-8"),
-    "/page.js": ("page.js", "text/javascript; charset=utf-8"),
-    "/plot.js": ("plot.js", "text/javascript; charset=utf-8"),
+    "/page.js": ("page.js", _JAVASCRIPT),
+    "/plot.js": ("plot.js", _JAVASCRIPT),
 }
+# In `page.html`: whose scene it is. The server tells the pages' cameras apart by it.
+_SCENE_OF_PAGE: Final = b"{page}"
 # A browser that keeps to it can contact nobody but this server, whatever the page's code says.
 _OURS: Final = (
     "default-src 'self'; img-src 'self' data:; object-src 'none'; base-uri 'none'; "
@@ -55,18 +58,22 @@ _VISERS: Final = (
     "default-src 'self' 'unsafe-inline' 'unsafe-eval' blob: data:; connect-src 'self' blob: data:; "
     "object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
 )
-# viser can't be told to leave out its panel, which hides an instrument and opens developers'
-# settings: a window of its own, or on a narrow screen a sheet.
-_WITHOUT_PANEL: Final = (
-    b"<style>[data-floating-window],[data-dock-region],.mantine-ScrollArea-root"
-    b"{display:none !important}</style></head>"
-)
+_SCENES_PAGE: Final = {
+    "Content-Type": _HTML,
+    "Content-Security-Policy": _VISERS,
+    "Cache-Control": "no-cache",
+}
+# Its name changes with what is in it.
+_SCENES_PROGRAM: Final = {
+    "Content-Type": _JAVASCRIPT,
+    "Content-Security-Policy": _VISERS,
+    "Cache-Control": "private, max-age=31536000, immutable",
+}
 _NO_TOKEN: Final = (
     b"This page asks for a token: open the address that `fras monitor` printed, token included.\n"
 )
 
 Handler = Callable[[ServerConnection], Awaitable[None]]
-Screen = Callable[[ServerConnection, Request], Response | None]
 
 
 class PortInUse(FrasError):
@@ -101,6 +108,7 @@ class Door:
     def __init__(self, host: str, port: int, policy: Policy, control: Handler) -> None:
         self._policy = policy
         self._control = control
+        self._client = read_client()
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
         self.socket = socket.socket(family, socket.SOCK_STREAM)
         self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -132,13 +140,8 @@ class Door:
 
         def ours(handler: Handler, host: str, port: int, **options: Any) -> Any:
             del host, port
-            screen = options.pop("process_request")
-            return serve(
-                self._guarded(handler),
-                sock=self.socket,
-                process_request=self._screened(screen),
-                **options,
-            )
+            options["process_request"] = self._screen
+            return serve(self._guarded(handler), sock=self.socket, **options)
 
         module.serve = ours
         try:
@@ -160,28 +163,29 @@ class Door:
 
         return handle
 
-    def _screened(self, visers: Screen) -> Screen:
-        def screen(connection: ServerConnection, request: Request) -> Response | None:
-            path = request.path.partition("?")[0]
-            upgrades = request.headers.get("Upgrade", "").lower() == "websocket"
-            host = request.headers.get("Host", "")
-            if not comes_from_here(request.headers.get("Origin"), host, self._policy):
-                return _plain(HTTPStatus.FORBIDDEN, b"Not from here.\n")
-            if self._role(request) is None:
-                return _plain(HTTPStatus.UNAUTHORIZED, _NO_TOKEN)
-            if upgrades:
-                known = path == CONTROL or SCENE.fullmatch(path)
-                return None if known else _plain(HTTPStatus.NOT_FOUND, b"No such place.\n")
-            if path == "/" and (token := token_in_query(request.path)):
-                headers = {"Location": "/", "Set-Cookie": cookie_for(token, self.port)}
-                return _response(HTTPStatus.SEE_OTHER, b"", headers)
-            if path in FILES:
-                return _file(*FILES[path])
-            if (scene := SCENE.fullmatch(path)) is not None and scene[2]:
-                return _scene(connection, request, visers)
-            return _plain(HTTPStatus.NOT_FOUND, b"No such place.\n")
-
-        return screen
+    def _screen(self, _: ServerConnection, request: Request) -> Response | None:
+        path = request.path.partition("?")[0]
+        upgrades = request.headers.get("Upgrade", "").lower() == "websocket"
+        host = request.headers.get("Host", "")
+        if not comes_from_here(request.headers.get("Origin"), host, self._policy):
+            return _plain(HTTPStatus.FORBIDDEN, b"Not from here.\n")
+        if self._role(request) is None:
+            return _plain(HTTPStatus.UNAUTHORIZED, _NO_TOKEN)
+        if upgrades:
+            known = path == CONTROL or SCENE.fullmatch(path)
+            return None if known else _plain(HTTPStatus.NOT_FOUND, b"No such place.\n")
+        if path == "/" and (token := token_in_query(request.path)):
+            headers = {"Location": "/", "Set-Cookie": cookie_for(token, self.port)}
+            return _response(HTTPStatus.SEE_OTHER, b"", headers)
+        if path == "/":
+            return _page()
+        if path in FILES:
+            return _file(*FILES[path])
+        if (scene := SCENE.fullmatch(path)) is not None and scene[1] and scene[2]:
+            return _text(request, self._client.page, _SCENES_PAGE)
+        if self._client.program is not None and path == f"/scene/{self._client.name}":
+            return _text(request, self._client.program, _SCENES_PROGRAM)
+        return _plain(HTTPStatus.NOT_FOUND, b"No such place.\n")
 
     def _role(self, request: Request) -> Role | None:
         shown = token_in_query(request.path)
@@ -190,33 +194,27 @@ class Door:
         return self._policy.role_of(shown)
 
 
-def _scene(connection: ServerConnection, request: Request, visers: Screen) -> Response | None:
-    """Let viser serve its client, without its panel, and forbid that to contact anybody else."""
-    response = visers(connection, Request("/", Headers()))
-    if response is None or not response.body:
-        return response
-    plain, packed = _without_panel(bytes(response.body))
-    takes_packed = "gzip" in request.headers.get("Accept-Encoding", "")
-    headers = {
-        "Content-Type": response.headers["Content-Type"],
-        "Content-Encoding": "gzip" if takes_packed else "identity",
-        "Content-Security-Policy": _VISERS,
-        "Cache-Control": "no-cache",
-    }
-    return _response(response.status_code, packed if takes_packed else plain, headers)
+def _text(request: Request, text: Text, headers: dict[str, str]) -> Response:
+    """Send it packed to a browser that takes it so."""
+    packs = "gzip" in request.headers.get("Accept-Encoding", "")
+    told = {"Content-Encoding": "gzip" if packs else "identity", **headers}
+    return _response(HTTPStatus.OK, text.packed if packs else text.plain, told)
 
 
-@lru_cache(maxsize=1)
-def _without_panel(client: bytes) -> tuple[bytes, bytes]:
-    """Return viser's client so that its panel is not shown, as it is and packed."""
-    changed = client.replace(b"</head>", _WITHOUT_PANEL, 1)
-    return changed, gzip.compress(changed)
+def _page() -> Response:
+    """Send the page, which asks for its scene at once."""
+    body = _read("page.html").replace(_SCENE_OF_PAGE, secrets.token_hex(16).encode())
+    headers = {"Content-Type": _HTML, "Content-Security-Policy": _OURS, "Cache-Control": "no-store"}
+    return _response(HTTPStatus.OK, body, headers)
 
 
 def _file(name: str, kind: str) -> Response:
-    body = (Path(__file__).parent / "static" / name).read_bytes()
     headers = {"Content-Type": kind, "Content-Security-Policy": _OURS, "Cache-Control": "no-cache"}
-    return _response(HTTPStatus.OK, body, headers)
+    return _response(HTTPStatus.OK, _read(name), headers)
+
+
+def _read(name: str) -> bytes:
+    return (Path(__file__).parent / "static" / name).read_bytes()
 
 
 def _plain(status: HTTPStatus, body: bytes) -> Response:

@@ -9,10 +9,10 @@ let socket = null;
 let heardAt = 0;
 let session = null;
 let you = "viewer";
-// Whose scene it is: the server tells the pages' cameras apart by it.
-const page = [...crypto.getRandomValues(new Uint8Array(16))].map((byte) => byte.toString(16).padStart(2, "0")).join("");
 
 const $ = (id) => document.getElementById(id);
+// Whose scene it is: the server tells the pages' cameras apart by it.
+const [, page] = $("scene").getAttribute("src").split("/");
 const say = (element, text) => {
   if (element.textContent !== text) element.textContent = text;
 };
@@ -304,8 +304,6 @@ $("rate").onchange = () => {
 window.addEventListener("keydown", onKey, { capture: true });
 // A tablet that is turned: what stands still would be shown stretched.
 window.addEventListener("resize", () => known.course && plots());
-
-$("scene").src = `scene/${page}/`;
 
 // Keys go to the frame that was clicked last: the stop must hear them there, too, from the moment
 // on in which the frame is there. Its load event is too late, or may be over before this runs.
