@@ -330,6 +330,14 @@ def test_who_only_listens_may_be_there(stage: Callable[..., Theatre], token: str
     assert theatre.played() == pairs()
 
 
+def test_a_replay_that_comes_later_ends_none_that_runs(stage: Callable[..., Theatre]):
+    theatre = stage(rate=0.0)
+    MemoryBus(theatre.fabric, CELL, "replay/7f").announce("alive/replay")
+    theatre.settle()
+    assert theatre.service.intruder is None
+    assert theatre.played() == pairs()
+
+
 def recorder_in(fabric: MemoryFabric) -> list[Any]:
     """A recorder that is asked and does not answer yet."""
     asked: list[Any] = []

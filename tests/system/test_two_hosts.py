@@ -29,6 +29,7 @@ WAITING_WITHIN_S = 0.5 + 0.25 + 0.5 + 0.75
 HEALTH_PERIOD_S = 0.5
 # Below the rows there may be remarks that begin with the name, too.
 ROW = re.compile("motion {2}")
+TICK = re.compile(r"MB +(\d+)")
 MESH = "11,13,2"
 # Slow, so that a second partition still meets the trial.
 PACE = "0.5"
@@ -52,7 +53,7 @@ class Relayed:
 
 
 @pytest.fixture(scope="module")
-def relayed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[SlowLink, TwoHosts]]:
+def both_sides(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[SlowLink, TwoHosts]]:
     """A stack on both sides of a relay, which every machine can do."""
     ports = {host: free_port() for host in "AB"}
     with (
@@ -60,6 +61,24 @@ def relayed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[SlowLink
         TwoHosts(Relayed(link, ports), tmp_path_factory.mktemp("relayed")) as hosts,
     ):
         yield link, hosts
+
+
+@pytest.fixture
+def relayed(
+    both_sides: tuple[SlowLink, TwoHosts], wait_until: Callable[..., Any]
+) -> tuple[SlowLink, TwoHosts]:
+    """The same, whole and idle, whatever the test before has left."""
+    link, hosts = both_sides
+    link.heal()
+    link.delay_s = 0.0
+    wait_until(lambda: is_idle(hosts), "both hosts are ready")
+    return both_sides
+
+
+def is_idle(hosts: TwoHosts) -> bool:
+    """Whether every process is ready, and no trial under way."""
+    status = hosts.start("A", "status")
+    return status.end() == 0 and ("task " not in status.text or ": idle" in status.text)
 
 
 @pytest.fixture(scope="module")
@@ -103,9 +122,11 @@ class Partition:
         """Begin, and end when something was seen."""
         self.part()
         self.parted_ns = time.time_ns()
-        seen()
-        self.healed_ns = time.time_ns()
-        self.heal()
+        try:
+            seen()
+        finally:
+            self.healed_ns = time.time_ns()
+            self.heal()
 
     def check(self, log: Path) -> None:
         """The arms stood, motion said for whom it waited, and they went on."""
@@ -152,9 +173,10 @@ class Watch:
             "motion waits",
         )
 
-    def until_it_goes_on(self) -> None:
-        """Wait until motion is seen not to wait."""
-        self._wait_until(lambda: "waiting: s" not in self.rows()[-1], "motion goes on")
+    def until_it_moves(self) -> None:
+        """Wait until motion is seen to tick, twice: once may be what happened before."""
+        seen = len(self.rows())
+        self._wait_until(lambda: len(set(TICK.findall("".join(self.rows()[seen:])))) >= 3, "ticks")
 
     def end(self) -> None:
         """Stop looking."""
@@ -170,7 +192,8 @@ def partitions_from_mid_lift(
     trial = hosts.start("A", "run", "a", "--mesh", MESH, "--pace", PACE, "--json", "--out", out)
     trial.until("lifting")
     for partition in partitions:
-        watch.until_it_goes_on()
+        # That an action is announced does not mean that motion has it already.
+        watch.until_it_moves()
         partition.last_until(watch.until_waiting)
     assert trial.end() == 0, trial.text
     watch.end()
@@ -182,13 +205,14 @@ def partitions_from_mid_lift(
 
 
 def test_partitions_stand_the_arms_and_heal(
-    relayed: tuple[SlowLink, TwoHosts], wait_until: Callable[..., Any]
+    relayed: tuple[SlowLink, TwoHosts], tmp_path: Path, wait_until: Callable[..., Any]
 ) -> None:
     """First nothing is heard of the other host, then the connection is cut."""
     link, hosts = relayed
     both = [Partition(part, link.heal) for part in (link.silence, link.cut)]
-    partitions_from_mid_lift(hosts, "parted", both, wait_until)
-    assert audit_log(hosts.log("parted"), SERVICES, lambda *_: None).passed
+    out = str(tmp_path / "parted")
+    partitions_from_mid_lift(hosts, out, both, wait_until)
+    assert audit_log(hosts.log(out), SERVICES, lambda *_: None).passed
 
 
 def test_a_partition_that_lasts_ends_the_trial_by_name_and_another_runs_over_a_slow_link(
@@ -199,27 +223,29 @@ def test_a_partition_that_lasts_ends_the_trial_by_name_and_another_runs_over_a_s
     run = msgspec.structs.replace(scenario.run, peer_timeout_s=1.0)
     path = tmp_path / "impatient.toml"
     path.write_text(to_toml(msgspec.structs.replace(scenario, run=run)))
-    trial = hosts.start("A", "run", str(path), "--json", "--out", "lasts")
+    lasts, slow = str(tmp_path / "lasts"), str(tmp_path / "slow")
+    trial = hosts.start("A", "run", str(path), "--json", "--out", lasts)
     trial.until("lifting")
     known = {host: hosts.up[host].text.count(READY) for host in "AB"}
     link.cut()
-    hosts.up["A"].until("waiting for sim, sa of host B", times=known["A"])
-    hosts.up["B"].until("of host A", times=known["B"])
-    assert trial.end() == 1
-    summary = summary_of(trial)
-    link.heal()
+    try:
+        hosts.up["A"].until("waiting for sim, sa of host B", times=known["A"])
+        hosts.up["B"].until("of host A", times=known["B"])
+        assert trial.end() == 1
+        summary = summary_of(trial)
+    finally:
+        link.heal()
     assert summary["outcome"] == "aborted"
     assert summary["reason"] in ("hold:sim", "hold:sa")
-    assert verify_file(hosts.log("lasts")).intact
+    assert verify_file(hosts.log(lasts)).intact
     for host in "AB":
         hosts.up[host].until(READY, times=known[host] + 1)
     link.delay_s = 5e-3
-    summary = hosts.run("a", "slow", "--pace", "0", "--mesh", MESH)
-    link.delay_s = 0.0
+    summary = hosts.run("a", slow, "--pace", "0", "--mesh", MESH)
     assert summary["outcome"] == "success"
     # Both ways for every tick: robot/state to B, the verdict back.
     assert summary["tick_ms"]["p50"] > 10.0
-    require_whole(hosts, "slow", summary)
+    require_whole(hosts, slow, summary)
 
 
 def test_who_is_asked_on_one_host_knows_the_others(relayed: tuple[SlowLink, TwoHosts]) -> None:
@@ -236,12 +262,12 @@ def test_who_is_asked_on_one_host_knows_the_others(relayed: tuple[SlowLink, TwoH
     assert "there is no host 'C'; it has A, B" in refused.text
 
 
-def test_a_trial_runs_over_a_lossy_wire(wired: tuple[Wire, TwoHosts]) -> None:
+def test_a_trial_runs_over_a_lossy_wire(wired: tuple[Wire, TwoHosts], tmp_path: Path) -> None:
     wire, hosts = wired
     wire.loss = 0.01
     for delay_s in (5e-3, 20e-3):
         wire.delay_s = delay_s
-        out = f"wire-{delay_s * 1e3:.0f}"
+        out = str(tmp_path / f"wire-{delay_s * 1e3:.0f}")
         summary = hosts.run("a", out, "--pace", "0")
         assert summary["outcome"] == "success"
         assert summary["tick_ms"]["p50"] > 2e3 * delay_s
@@ -250,10 +276,10 @@ def test_a_trial_runs_over_a_lossy_wire(wired: tuple[Wire, TwoHosts]) -> None:
 
 
 def test_a_wire_that_carries_nothing_stands_the_arms(
-    wired: tuple[Wire, TwoHosts], wait_until: Callable[..., Any]
+    wired: tuple[Wire, TwoHosts], tmp_path: Path, wait_until: Callable[..., Any]
 ) -> None:
     wire, hosts = wired
     unplugged = Partition(
         lambda: setattr(wire, "carries", False), lambda: setattr(wire, "carries", True)
     )
-    partitions_from_mid_lift(hosts, "unplugged", [unplugged], wait_until)
+    partitions_from_mid_lift(hosts, str(tmp_path / "unplugged"), [unplugged], wait_until)

@@ -1,7 +1,7 @@
 """Who else is in the cell: nobody who acts on messages, before a replay and while it runs."""
 
 from fras_common.service import ServiceHost
-from fras_replay.cell import live
+from fras_replay.cell import NAME, live
 from fras_replay.errors import LiveCell
 
 __all__ = ["CellWatch"]
@@ -48,7 +48,8 @@ class CellWatch:
         self._host.bus.watch_tokens(self._on_token)
 
     def _on_token(self, token: str, present: bool) -> None:
-        if present and live({token}, self._instance):
+        # Another replay looks again once it is seen, and finds this one: it is the one that goes.
+        if present and token.split("/")[1] != NAME and live({token}, self._instance):
             self._host.post(lambda: self._flee({token}))
 
     def _flee(self, tokens: set[str]) -> None:
