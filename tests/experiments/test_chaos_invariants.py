@@ -53,8 +53,11 @@ def test_a_restart_of_motion_breaks_nothing():
     assert look(restarted().evidence, QUIET) == ()
 
 
-def begun_in_mid_stream(*listed: str) -> Story:
-    """Each publisher has said much before the log begins; its first recorder tells who is there."""
+def begun_in_mid_stream(*listed: str, later: str = "") -> Story:
+    """Each publisher has said much before the log begins; its first recorder tells who is there.
+
+    `later` is told a tick after that.
+    """
     told = Story(
         [
             (key, msgspec.structs.replace(one, seq=one.seq + 100))
@@ -62,19 +65,21 @@ def begun_in_mid_stream(*listed: str) -> Story:
             if not isinstance(one, RecorderEvent)
         ]
     )
-    place = 1 + next(n for n, (_, one) in enumerate(told.said) if isinstance(one, RobotState))
-    told.said[place:place] = [("recorder/event", event("present", one)) for one in listed]
+    first, second = [n for n, (_, one) in enumerate(told.said) if isinstance(one, RobotState)][:2]
+    if later:
+        told.said.insert(second + 1, ("recorder/event", event("present", later)))
+    told.said[first + 1 : first + 1] = [("recorder/event", event("present", one)) for one in listed]
     return told
 
 
 def test_whom_the_first_recorder_finds_was_there_before_the_log_began():
     """One that was killed before it had written anything leaves the listing to the next one."""
-    told = begun_in_mid_stream("alive/sim/a", "alive/motion/a", "alive/recorder/a")
+    told = begun_in_mid_stream("alive/motion/a", "alive/recorder/a", "alive/sim/a")
     assert look(told.evidence, QUIET) == ()
 
 
 def words_of_before_from_one_that_comes_later() -> Story:
-    return begun_in_mid_stream("alive/recorder/a", "alive/motion/a")
+    return begun_in_mid_stream("alive/recorder/a", later="alive/motion/a")
 
 
 def ends_badly() -> Story:

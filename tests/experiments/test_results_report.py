@@ -164,6 +164,10 @@ def test_points_of_a_sweep_are_told_as_they_were_designed(tmp_path: Path):
     single = [{"a.x": 1, "b.y": 1}, {"a.x": 2, "b.y": 1}, {"a.x": 1, "b.y": 3}]
     trials = read_results(results_folder(tmp_path / "o", single, swept=["a.x", "b.y"])).trials
     assert [group.label for group in by_point(trials)] == ["base", "a.x = 2", "b.y = 3"]
+    # A case changes two fields, always together.
+    cases = [{"a": 1, "b": 1, "c": 1}, {"a": 2, "b": 1, "c": 1}, {"a": 1, "b": 2, "c": 3}]
+    trials = read_results(results_folder(tmp_path / "c", cases, swept=["a", "b", "c"])).trials
+    assert [group.label for group in by_point(trials)] == ["base", "a = 2", "b = 2, c = 3"]
     drawn = [{"a.x": i / 100, "b.y": "lex" if i % 2 else "sum"} for i in range(80)]
     trials = read_results(results_folder(tmp_path / "s", drawn, swept=["a.x", "b.y"])).trials
     groups = by_point(trials)

@@ -22,6 +22,7 @@ from fras_log import (
 )
 from support.damage import OPENING, Recording, Whole, robot, write_log
 from support.forger import metadata, put_together, take_apart
+from support.verdicts import verdict
 
 NEWER = "9.0.1"
 
@@ -237,6 +238,21 @@ def test_arms_that_moved_without_a_verdict_are_named(tmp_path: Path):
     assert finding.kind == "interlock"
     assert (finding.topic, finding.tick) == ("robot/state", 2)
     assert "there is none for tick 1" in finding.text
+
+
+def test_verdicts_on_states_that_never_arrived_are_named(tmp_path: Path):
+    path = tmp_path / "it.mcap"
+    file = LogFile(path, OPENING, {}, 1)
+    recording = Recording(file)
+    recording.tick(0)
+    # Motion was killed, and with it what the recorder had not written yet: no number tells.
+    recording.put("sa/verdict", verdict(1))
+    recording.put("sa/verdict", verdict(2))
+    file.close({})
+    (finding,) = verify_file(path).findings
+    assert finding.kind == "interlock"
+    assert (finding.topic, finding.tick) == ("sa/verdict", 1)
+    assert "2 of ticks 1 to 2" in finding.text
 
 
 def test_a_key_told_in_two_encodings_keeps_both(tmp_path: Path):

@@ -31,6 +31,15 @@ def test_a_flood_of_names_on_one_key_hides_no_gap_on_another():
     assert streams.note(KEY, header("sa/genuine", 20 * SOURCES - 2)) is None
 
 
+def test_one_that_comes_late_makes_no_gap_of_what_came_before_it():
+    streams = Streams()
+    for seq in (5, 6, 7, 4):
+        assert streams.note(KEY, header("sa/1", seq)) == 0
+    assert streams.note(KEY, header("sa/1", 8)) == 0
+    assert streams.note(KEY, header("sa/1", 2)) == 0
+    assert streams.note(KEY, header("sa/1", 10)) == 2  # 3 and 9
+
+
 def test_keys_without_end_are_forgotten_and_those_of_ours_never():
     streams = Streams({KEY: {"sa/1": 5}})
     for number in range(2 * OTHER_KEYS):

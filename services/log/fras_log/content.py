@@ -18,16 +18,23 @@ def _own_version() -> str:
     return version("fras")
 
 
+class _Place(NamedTuple):
+    """Where a message stands."""
+
+    offset: int
+    topic: str
+    sequence: int
+    tick: int
+    file: str
+
+
 class _Move(NamedTuple):
     """A state of the arms, and where it stands."""
 
     trial: str
     tick: int
     verdict_tick: int
-    offset: int
-    topic: str
-    sequence: int
-    file: str
+    place: _Place
 
 
 class Content:
@@ -44,6 +51,9 @@ class Content:
         self._topics: dict[str, Topic[Any] | None] = {}
         self._next: dict[tuple[str, str], int] = {}
         self._verdicts: set[tuple[str, int]] = set()
+        self._states: set[tuple[str, int]] = set()
+        # Verdicts on states that were not there yet.
+        self._blind: dict[tuple[str, int], _Place] = {}
         # Of which the verdict was not there yet; one of many that say the same.
         self._moves: dict[tuple[str, int, int], _Move] = {}
         self._whole = True
@@ -74,7 +84,7 @@ class Content:
         if not may_be_lost(key):
             self._count(message, header)
         if topic is VERDICT and isinstance(decoded, Verdict):
-            self._verdicts.add((decoded.trial, decoded.tick))
+            self._note_verdict((decoded.trial, decoded.tick), message)
         elif topic is ROBOT_STATE and isinstance(decoded, RobotState):
             self._note_move(decoded, message)
         return header.tick
@@ -94,23 +104,34 @@ class Content:
             if not judged or move.verdict_tick != move.tick - 1:
                 text = f"the arms moved on verdict {move.verdict_tick}"
                 text += "" if judged else f", and there is none for tick {move.tick - 1}"
-                place = (move.offset, move.topic, move.sequence, move.tick, move.file)
-                self._found.add(Finding("interlock", text, *place))
+                self._found.add(Finding("interlock", text, *move.place))
+        if self._whole and self._blind and self._found.intact:
+            # Whoever sent them was killed, and the recorder with it: no later number tells.
+            ticks = [tick for _, tick in self._blind]
+            text = (
+                f"states of the arms never arrived, {len(ticks)} of ticks {min(ticks)} to "
+                f"{max(ticks)}: there are verdicts on them"
+            )
+            self._found.add(Finding("interlock", text, *next(iter(self._blind.values()))))
+
+    def _note_verdict(self, judged: tuple[str, int], message: Recorded) -> None:
+        self._verdicts.add(judged)
+        if judged not in self._states:
+            self._blind.setdefault(judged, self._place(message, judged[1]))
+
+    def _place(self, message: Recorded, tick: int) -> _Place:
+        return _Place(message.offset, message.topic, message.sequence, tick, self._found.file)
 
     def _note_move(self, state: RobotState, message: Recorded) -> None:
+        self._states.add((state.trial, state.tick))
+        self._blind.pop((state.trial, state.tick), None)
         before = state.tick - 1
         on_it = state.verdict_tick == before and (state.trial, before) in self._verdicts
         name = (state.trial, state.tick, state.verdict_tick)
         if before < 0 or on_it or name in self._moves:
             return
         self._moves[name] = _Move(
-            state.trial,
-            state.tick,
-            state.verdict_tick,
-            message.offset,
-            message.topic,
-            message.sequence,
-            self._found.file,
+            state.trial, state.tick, state.verdict_tick, self._place(message, state.tick)
         )
 
     def _decode(self, topic: Topic[Any], message: Recorded) -> Any:

@@ -18,7 +18,7 @@ class Finding:
         or another one), `chain` (a message that was changed,
         moved, added or left out), `signature`, `version` (a newer FRAS wrote it), `sequence`
         (messages that never arrived), `schema` (a payload that does not fit its key), `interlock`
-        (the arms moved without a verdict).
+        (the arms moved without a verdict, or a verdict on a state of theirs that is not there).
     text : str
         What is wrong.
     offset : int

@@ -116,7 +116,10 @@ class _Stream:
         if self.highest is None or seq > self.highest:
             self.highest = seq
         last, self._last = self._last, seq
-        return seq - last - 1 if last is not None and seq > last else 0
+        if last is None or seq <= last + 1:
+            return 0
+        # What is between them may have come earlier, before one that came late.
+        return seq - last - 1 - len({one for one, _ in recent if last < one < seq})
 
     def precedes(self, seq: int) -> bool:
         first, before = self._first, self._before

@@ -100,21 +100,25 @@ def complete(evidence: Evidence, undisturbed: Undisturbed) -> Iterator[Breach]:
 def _born_within(evidence: Evidence) -> set[str]:
     """Find who began to speak within the trial: all that they ever said belongs into its log.
 
-    Whom the first recorder finds, before it shows itself, was there already: it may be the second
-    one, if nothing that the first had heard was written yet.
+    Whom the first recorder lists as it begins, itself among them, was there already: it may be the
+    second one, if nothing that the first had heard was written yet.
     """
-    began = listed = False
+    began = listed = listing = False
     seen, born = set[str](), set[str]()
     for message in evidence.order:
         if isinstance(message, RobotState):
-            began = True
-        elif (found := _alive(message)) and message.kind == "present":
-            if began and found[1] not in seen:
-                born.add(found[1])
-            seen.add(found[1])
-            if found[1] == message.source and not listed:
-                listed = True
-                born.clear()
+            began, listing = True, False
+            continue
+        found = _alive(message)
+        if found is None or message.kind != "present":
+            listing = False
+            continue
+        if began and not listing and found[1] not in seen:
+            born.add(found[1])
+        seen.add(found[1])
+        if found[1] == message.source and not listed:
+            listed = listing = True
+            born.clear()
     return born
 
 

@@ -1,5 +1,6 @@
 """Trials put together: by scenario kind, and by what was swept."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -51,8 +52,8 @@ def by_point(trials: Trials) -> tuple[Group, ...]:
     order = list(dict.fromkeys(points))
     if len(order) > MOST_POINTS:
         return tuple(group for name, text in varied.items() for group in _quarters(name, text))
-    # Of one factor at a time, all but one field have the first point's values: they go without.
-    alone = all(sum(a != b for a, b in zip(one, order[0], strict=True)) <= 1 for one in order)
+    # Of one factor at a time, all other fields have the first point's values: they go without.
+    alone = _one_at_a_time(order)
     return tuple(
         Group(
             ", ".join(
@@ -65,6 +66,14 @@ def by_point(trials: Trials) -> tuple[Group, ...]:
         )
         for point in order
     )
+
+
+def _one_at_a_time(points: Sequence[tuple[str, ...]]) -> bool:
+    """Whether fields change against the first point one by one, or always in the same company."""
+    first = points[0]
+    changed = {frozenset(i for i, one in enumerate(point) if one != first[i]) for point in points}
+    fields = [field for together in changed for field in together]
+    return len(fields) == len(set(fields))
 
 
 def _quarters(name: str, text: NDArray[np.str_]) -> tuple[Group, ...]:

@@ -46,7 +46,8 @@ def draw_effects(results: Results, seed: int) -> Figure | None:
             ],
         )
         right.set_xlabel("reached the limit [points]")
-        left.set_yticks(range(len(effects)), [one.label for one in effects], fontsize=7)
+        labels = [one.label.replace(", ", "\n") for one in effects]
+        left.set_yticks(range(len(effects)), labels, fontsize=7)
         left.invert_yaxis()
         figure.suptitle(f"change against {base}", fontsize=8.5)
     return figure
