@@ -105,7 +105,7 @@ class Content:
                 text = f"the arms moved on verdict {move.verdict_tick}"
                 text += "" if judged else f", and there is none for tick {move.tick - 1}"
                 self._found.add(Finding("interlock", text, *move.place))
-        if self._whole and self._blind and self._found.intact:
+        if self._states and self._blind and self._whole and self._found.intact:
             # Whoever sent them was killed, and the recorder with it: no later number tells.
             ticks = [tick for _, tick in self._blind]
             text = (
