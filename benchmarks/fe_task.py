@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fras_sim.fem import Mesh, TissueParameters, TissueSimulator, ToolInput, box_mesh
-from fras_sim.fem.assembly import ElasticBody, SparsityPattern
+from fras_sim.fem.assembly import ElasticBody
 from fras_sim.fem.grasp import nodes_in_reach
 from fras_sim.fem.linear_solver import SOLVERS, LinearSolver, linear_solver
+from fras_sim.fem.pattern import SparsityPattern
 
 DT_S = 0.02
 LIFT_M = 0.05

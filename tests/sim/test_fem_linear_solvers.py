@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from fras_sim.fem import BadParameter, FactorizationFailed, box_mesh
-from fras_sim.fem.assembly import ElasticBody, sparsity_pattern
+from fras_sim.fem.assembly import ElasticBody
 from fras_sim.fem.linear import dissection, mkl_library
 from fras_sim.fem.linear.mkl_library import SolverUnavailable, has_mkl
 from fras_sim.fem.linear_solver import SOLVERS, linear_solver
+from fras_sim.fem.pattern import sparsity_pattern
 
 NEEDS_MKL = pytest.mark.skipif(not has_mkl(), reason="the extra mkl is not installed")
 DOUBLE = ["scipy", pytest.param("mkl", marks=NEEDS_MKL)]
@@ -148,7 +149,7 @@ def test_entries_that_are_not_finite_are_refused(name, value):
 BITS = """
 import hashlib, sys
 import numpy as np
-from fras_sim.fem.assembly import sparsity_pattern
+from fras_sim.fem.pattern import sparsity_pattern
 from fras_sim.fem import box_mesh
 from fras_sim.fem.linear_solver import linear_solver
 

@@ -11,10 +11,11 @@ from fras_sim.fem import (
     compile_kernels,
     kernels,
 )
-from fras_sim.fem.assembly import ElasticBody, IdentityRows
+from fras_sim.fem.assembly import ElasticBody
 from fras_sim.fem.healing import heal
 from fras_sim.fem.lbfgs import LbfgsMemory
 from fras_sim.fem.linear_solver import linear_solver
+from fras_sim.fem.pattern import IdentityRows
 
 
 def body_of(counts=(7, 9, 2), fixed_share=0.4):

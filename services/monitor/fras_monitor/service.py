@@ -77,8 +77,6 @@ class MonitorService:
         )
         self.address = door.address
         announce(self.address)
-        # The host's own thread draws; the server's, on which a stop comes, is there already.
-        give_way()
 
     def _on_command(self, command: AnyCommand) -> None:
         """Do what a button asks; the stop at once, on the thread that got it."""
@@ -141,4 +139,7 @@ def build(
     def announce(address: str) -> None:
         print(f"the surgeon's page: {address}{query_of(policy)}", flush=True)
 
-    return MonitorService(host, host_name, port, policy, announce)
+    service = MonitorService(host, host_name, port, policy, announce)
+    # The host's own thread draws; the server's, on which a stop comes, is there already.
+    give_way()
+    return service

@@ -28,14 +28,14 @@ def _wrap(angle: float) -> float:
     return angle - 2 * pi * round(angle / (2 * pi))
 
 
-def inverse(tip: Vector3, rotation: Matrix, near_roll: float = 0.0) -> Joints:
+def inverse(tip_in_base: Vector3, rotation_in_base: Matrix, near_roll: float = 0.0) -> Joints:
     """Joints that bring the tip to a pose.
 
     Parameters
     ----------
-    tip : tuple of float, length 3
+    tip_in_base : tuple of float, length 3
         Position of the tip in the arm's base frame [m].
-    rotation : ndarray, shape (3, 3), float64
+    rotation_in_base : ndarray, shape (3, 3), float64
         Rotation of the tip in the arm's base frame.
     near_roll : float
         Of the values of the roll that differ by a full turn, the one nearest to this is
@@ -62,7 +62,7 @@ def inverse(tip: Vector3, rotation: Matrix, near_roll: float = 0.0) -> Joints:
     R36 = Rz(q4) Ry(q5 - pi/2) Rz(pi/2 - q6) Rx(-pi), a ZYZ decomposition whose branch is fixed
     by |q5| < pi/2.
     """
-    rows = rotation.tolist()
+    tip, rows = tip_in_base, rotation_in_base.tolist()
     # Columns of the last joint's frame, by the constant rotation from it to the tip.
     x6 = (-rows[0][1], -rows[1][1], -rows[2][1])
     y6 = (rows[0][2], rows[1][2], rows[2][2])

@@ -7,13 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fras_sim.fem import kernels
-from fras_sim.fem.assembly import ElasticBody, IdentityRows
+from fras_sim.fem.assembly import ElasticBody
 from fras_sim.fem.contact import bed_stiffness, penetrating
 from fras_sim.fem.errors import FactorizationFailed
 from fras_sim.fem.kernels import largest
 from fras_sim.fem.lbfgs import LbfgsMemory
 from fras_sim.fem.linear_solver import LinearSolver
 from fras_sim.fem.parameters import SolverOptions, TissueParameters
+from fras_sim.fem.pattern import IdentityRows
 
 STANDARD_GRAVITY_M_S2 = 9.80665
 ARMIJO = 1e-4

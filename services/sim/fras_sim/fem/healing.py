@@ -4,8 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fras_sim.fem import kernels
-from fras_sim.fem.assembly import ElasticBody, IdentityRows
+from fras_sim.fem.assembly import ElasticBody
 from fras_sim.fem.linear_solver import LinearSolver
+from fras_sim.fem.pattern import IdentityRows
 
 FIRST_RINGS = 2
 

@@ -6,11 +6,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from fras_sim.fem.assembly import SparsityPattern
 from fras_sim.fem.errors import BadParameter
 from fras_sim.fem.linear.multifrontal import MultifrontalCholesky
 from fras_sim.fem.linear.pardiso import Pardiso
 from fras_sim.fem.linear.single import SinglePrecision
+from fras_sim.fem.pattern import SparsityPattern
 
 
 class LinearSolver(Protocol):

@@ -7,13 +7,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fras_sim.fem import kernels
-from fras_sim.fem.assembly import ElasticBody, IdentityRows
+from fras_sim.fem.assembly import ElasticBody
 from fras_sim.fem.element import CELL_OF, ElementKind
 from fras_sim.fem.errors import BadParameter, FactorizationFailed, NotConverged
 from fras_sim.fem.kernels import largest
 from fras_sim.fem.linear_solver import LinearSolver, linear_solver
 from fras_sim.fem.materials import MaterialName
 from fras_sim.fem.mesh import make_mesh
+from fras_sim.fem.pattern import IdentityRows
 
 ARMIJO = 1e-4
 MAX_HALVINGS = 12

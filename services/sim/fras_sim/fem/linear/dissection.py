@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fras_sim.fem.assembly import SparsityPattern
+from fras_sim.fem.pattern import SparsityPattern
 
 # Nodes that are not cut any further (6 to 24 are within 10 % of each other).
 LEAF = 12

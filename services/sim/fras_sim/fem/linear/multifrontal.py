@@ -6,12 +6,12 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fras_sim.fem.assembly import SparsityPattern
 from fras_sim.fem.errors import FactorizationFailed
 from fras_sim.fem.linear.blas import Dtype
 from fras_sim.fem.linear.blas_threads import one_blas_thread
 from fras_sim.fem.linear.dissection import Front, dissect
 from fras_sim.fem.linear.part import Part
+from fras_sim.fem.pattern import SparsityPattern
 from fras_sim.fem.second_core import second_core
 
 # With fewer operations than these one core is done before the second has been woken ...

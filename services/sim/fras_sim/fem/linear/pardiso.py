@@ -7,9 +7,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from fras_sim.fem.assembly import SparsityPattern
 from fras_sim.fem.errors import FactorizationFailed
 from fras_sim.fem.linear.mkl_library import mkl_library
+from fras_sim.fem.pattern import SparsityPattern
 
 Dtype = type[np.float32] | type[np.float64]
 

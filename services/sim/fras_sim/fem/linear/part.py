@@ -3,10 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from fras_sim.fem.assembly import SparsityPattern
 from fras_sim.fem.linear import front_kernels as kernels
 from fras_sim.fem.linear.blas import WIDTH, BlockRoutines, Dtype
 from fras_sim.fem.linear.dissection import Front
+from fras_sim.fem.pattern import SparsityPattern
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -5,10 +5,10 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from fras_sim.fem.assembly import SparsityPattern
 from fras_sim.fem.errors import FactorizationFailed
 from fras_sim.fem.linear.multifrontal import MultifrontalCholesky
 from fras_sim.fem.linear.pardiso import Pardiso
+from fras_sim.fem.pattern import SparsityPattern
 
 
 class SinglePrecision:
