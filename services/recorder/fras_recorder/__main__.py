@@ -13,7 +13,8 @@ NICENESS = 5
 @silent_interrupt()
 def main(argv: list[str] | None = None) -> int:
     """Run the recorder, behind the processes that the arms wait for."""
-    os.nice(NICENESS)
+    if argv is None:  # a process of its own
+        os.nice(NICENESS)
     one_thread()
     from fras_common.service import run_service
 
