@@ -174,10 +174,10 @@ class Door:
         if upgrades:
             known = path == CONTROL or SCENE.fullmatch(path)
             return None if known else _plain(HTTPStatus.NOT_FOUND, b"No such place.\n")
-        if path == "/" and (token := token_in_query(request.path)):
-            headers = {"Location": "/", "Set-Cookie": cookie_for(token, self.port)}
-            return _response(HTTPStatus.SEE_OTHER, b"", headers)
         if path == "/":
+            if token := token_in_query(request.path):
+                headers = {"Location": "/", "Set-Cookie": cookie_for(token, self.port)}
+                return _response(HTTPStatus.SEE_OTHER, b"", headers)
             return _page()
         if path in FILES:
             return _file(*FILES[path])
