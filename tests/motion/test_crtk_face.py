@@ -39,6 +39,7 @@ from fras_common.topics import (
     MOTION_RESET,
     RESUME,
     ROBOT_STATE,
+    VERDICT,
     ArmTopics,
 )
 from fras_motion import service as motion_service
@@ -47,6 +48,7 @@ from fras_motion.service import MotionService
 from support.arms import HOME
 from support.goals import reach_goal
 from support.shells import ShellBench
+from support.verdicts import verdict
 
 PSM1, PSM2 = CRTK
 DOWN = ArmKinematics(BASES_IN_WORLD["psm1"]).tool_down_xyzw
@@ -94,8 +96,13 @@ class Client(ShellBench):
             self.host.drain(wait_s if wait_s is not None else 0.1)
         raise AssertionError("never came")
 
-    def begin_trial(self, trial: str = "t") -> None:
-        scenario = resolve(Scenario(run=RunSection(pace=0)))
+    def judge(self, tick: int) -> None:
+        """Say as SA does that the arms may move on."""
+        self.peers(VERDICT).put(verdict(tick, "t"))
+        self.settle()
+
+    def begin_trial(self, trial: str = "t", pace: float = 0.0) -> None:
+        scenario = resolve(Scenario(run=RunSection(pace=pace)))
         self.answer(MOTION_RESET, ResetRequest(trial=trial, scenario=scenario))
 
     def end_trial(self, trial: str = "t") -> None:
@@ -333,6 +340,38 @@ def test_a_command_of_the_wrong_state_is_refused_with_the_right_ones(client: Cli
     client.state_command(PSM1, "resume")
     assert reasons(client) == [(PSM1.state_command.key, "CommandRefused", "wrong_state")]
     assert "PAUSED" in client.faults[0].text
+
+
+def test_the_arms_of_a_trial_faster_than_life_say_where_they_are_ten_times_a_second(
+    client: Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now_s, heard = time.monotonic(), client.joints["psm1"]
+    monkeypatch.setattr(motion_service, "time", SimpleNamespace(monotonic=lambda: now_s))
+    client.begin_trial(pace=0.0)
+    reach(client)
+    for tick in range(20):
+        now_s += 0.02
+        client.judge(tick)
+    said = [one.tick for one in heard if one.tick > 0]
+    assert len(said) == pytest.approx(4, abs=1)
+    # What was not said at a tick is not lost: as the arms stand, it is said.
+    now_s += 0.1
+    client.settle()
+    assert heard[-1].tick == 20
+
+
+def test_the_arms_of_a_trial_at_the_pace_of_life_say_more_often_where_they_are(
+    client: Client,
+) -> None:
+    states: list[RobotState] = client.heard(ROBOT_STATE)
+    client.begin_trial(pace=1.0)
+    reach(client)
+    for tick in range(10):
+        client.judge(tick)
+        client.turn_until(lambda tick=tick: states[-1].tick > tick)
+    client.turn_until(lambda: client.joints["psm1"][-1].tick == 10)
+    # At each tick, but for one that comes too soon after a late one; at 10 Hz it would be two.
+    assert len({one.tick for one in client.joints["psm1"] if one.tick > 0}) >= 5
 
 
 def test_the_arms_say_no_more_than_a_hundred_times_a_second(

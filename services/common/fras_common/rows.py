@@ -59,6 +59,8 @@ class Topic(Generic[M]):
         A longer payload is malformed, whatever it says.
     kept : int
         How many the publisher keeps for who lost them or comes late, and the recorder remembers.
+    awaited : bool
+        A trial stands still until it has come: who lost the last one is to learn so at once.
     """
 
     key: str
@@ -69,6 +71,7 @@ class Topic(Generic[M]):
     in_trial: bool = True
     max_bytes: int = USUAL
     kept: int = KEPT
+    awaited: bool = False
 
     def of(self, **names: str) -> "Topic[M]":
         """Fill the placeholder: `HEALTH.of(service="sim")`."""

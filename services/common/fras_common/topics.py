@@ -43,7 +43,7 @@ class TissueTopics:
         )  # fmt: skip
         state = Topic(
             f"{service}/tissue_state", m.TissueState, service, Qos.STATE, "each tick",
-            max_bytes=BULK,
+            max_bytes=BULK, awaited=True,
         )  # fmt: skip
         checkpoint = Topic(
             f"{service}/checkpoint", m.SimCheckpoint, service, Qos.STATE, "every 10 ticks",
@@ -62,8 +62,8 @@ PATIENT: Final = TissueTopics.of("patient")
 """The tissue itself, where a trial has one besides its model: what is seen of it."""
 
 TISSUE_MODEL, TISSUE_STATE, SIM_CHECKPOINT = TWIN.model, TWIN.state, TWIN.checkpoint
-ROBOT_STATE = Topic("robot/state", m.RobotState, "motion", Qos.STATE, "each tick")
-VERDICT = Topic("sa/verdict", m.Verdict, "sa", Qos.STATE, "each tick")
+ROBOT_STATE = Topic("robot/state", m.RobotState, "motion", Qos.STATE, "each tick", awaited=True)
+VERDICT = Topic("sa/verdict", m.Verdict, "sa", Qos.STATE, "each tick", awaited=True)
 CONTEXT = Topic("sa/context", m.Context, "sa", Qos.EVENT, "on request", max_bytes=WORDY, kept=SOME)
 PLAN = Topic("planner/plan", m.Plan, "planner", Qos.EVENT, "each plan", max_bytes=WORDY, kept=SOME)
 TASK_STATUS = Topic(

@@ -11,7 +11,7 @@ from fras_common.errors import FrasError
 from fras_common.service import ServiceHost
 from fras_common.topics import CRTK
 from fras_motion.crtk import ArmStatus, CommandRefused, DirectControl, shown, way_back
-from fras_motion.crtk.face import CrtkFace
+from fras_motion.crtk.face import FAST_PERIOD_S, PERIOD_S, CrtkFace
 from fras_motion.crtk.link import CrtkLink
 from fras_motion.drivers import CrtkDriver, Driver
 from fras_motion.holds import Holds
@@ -88,6 +88,7 @@ class SimulatedArms:
         self._trial: MotionTrial | None = None
         self._said: tuple[int, Goal | None, dict[str, str]] | None = None
         self._heeded_holds = 0
+        self._period_s = PERIOD_S
         parameters = MotionParameters()
         kinematics = {name: ArmKinematics(base) for name, base in BASES_IN_WORLD.items()}
         home = home_setpoints(kinematics, HOME_TIPS_M, parameters)
@@ -99,7 +100,7 @@ class SimulatedArms:
 
     def drivers(self, parameters: MotionParameters, pace: float) -> Mapping[str, Driver]:
         """Make simulated arms with the numbers of the trial."""
-        del pace
+        self._period_s = PERIOD_S if 0.0 < pace <= 1.0 else FAST_PERIOD_S
         return simulated_drivers(parameters, BASES_IN_WORLD)
 
     def operating_state(self, arm: str) -> str:
@@ -132,7 +133,7 @@ class SimulatedArms:
         return wait_s
 
     def _say_trial(self, trial: MotionTrial, now_s: float) -> float:
-        """Say where the trial's arms are, once for each of its ticks."""
+        """Say where the trial's arms are, for each of its ticks unless it runs faster than life."""
         heartbeat_s = self._face.heartbeat_in_s(now_s)
         moment = (trial.tick, trial.goal, self._holds.current())
         if moment == self._said and heartbeat_s > 0.0:
@@ -142,7 +143,7 @@ class SimulatedArms:
             name: replace(arm, operating_state=self.operating_state(name))
             for name, arm in trial.controller.snapshot.arms.items()
         }
-        if self._face.publish(arms, busy, trial.tick, now_s):
+        if self._face.publish(arms, busy, trial.tick, now_s, self._period_s):
             self._said = moment
             return self._face.heartbeat_in_s(now_s)
         self._said = None

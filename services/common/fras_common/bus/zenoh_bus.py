@@ -34,7 +34,7 @@ from fras_common.bus.zenoh_wire import ENCODING, ZenohCall, beat, configured, nu
 from fras_common.codec import MalformedMessage, decode, encode
 from fras_common.errors import FrasError
 from fras_common.identity import Identity, require_tls
-from fras_common.keeping import kept_of
+from fras_common.keeping import beat_s_of, kept_of
 from fras_common.messages import Header
 from fras_common.topics import Qos, Query, Topic
 
@@ -42,7 +42,6 @@ M = TypeVar("M", bound=Header)
 Req = TypeVar("Req")
 Rep = TypeVar("Rep")
 
-HEARTBEAT_S = 0.1
 # Numbers that may wait until they are looked at; whoever repeats one does so again.
 BEATS = 1024
 TOKENS = ("alive/**", "ready/**")
@@ -139,7 +138,7 @@ class ZenohBus:
                 express=True,
                 cache=zenoh.ext.CacheConfig(kept_of(key)),
                 sample_miss_detection=zenoh.ext.MissDetectionConfig(
-                    heartbeat=HEARTBEAT_S, sporadic_heartbeat=None
+                    heartbeat=beat_s_of(key), sporadic_heartbeat=None
                 ),
             )
         self._declared.append(declared)

@@ -18,14 +18,15 @@ from fras_motion.states import ArmState
 from .direct import DirectControl
 from .errors import CommandRefused
 
-__all__ = ["HEARTBEAT_S", "PERIOD_S", "CrtkFace"]
+__all__ = ["FAST_PERIOD_S", "HEARTBEAT_S", "PERIOD_S", "CrtkFace"]
 
 PERIOD_S = 0.01
 """The arms say no more often than this, on average, where they are."""
+FAST_PERIOD_S = 0.1
+"""Nor than this in a trial faster than life: nobody follows it, and `robot/state` has each tick."""
 HEARTBEAT_S = 0.5
 """They say so at least this often, so that whoever comes later knows."""
 
-_GRACE_S = 0.5 * PERIOD_S
 _UNIT = 1e-6
 
 Permit = Callable[[str, str, str], None]
@@ -77,7 +78,12 @@ class CrtkFace:
             host.subscribe(keys.jaw_servo_jp, partial(self._servo_jaw, arm))
 
     def publish(
-        self, arms: Mapping[str, ArmState], busy: Mapping[str, bool], tick: int, now_s: float
+        self,
+        arms: Mapping[str, ArmState],
+        busy: Mapping[str, bool],
+        tick: int,
+        now_s: float,
+        period_s: float = PERIOD_S,
     ) -> bool:
         """Say where the arms are, if it is time to; a change of state is always said.
 
@@ -90,6 +96,8 @@ class CrtkFace:
             Of the trial, or -1.
         now_s : float
             Monotonic clock.
+        period_s : float
+            No more often than this is said where they are.
 
         Returns
         -------
@@ -98,7 +106,8 @@ class CrtkFace:
         """
         # Arms that tick at this very rate, a little late or early, would leave out every other time
         # if each were counted from the last; so there is a grid, and half a period of grace.
-        early = now_s < self._due_s - _GRACE_S
+        grace_s = 0.5 * period_s
+        early = now_s < self._due_s - grace_s
         heartbeat = now_s >= self._heartbeat_s and not early
         for name, arm in arms.items():
             status = self._direct.status(name)
@@ -110,8 +119,8 @@ class CrtkFace:
             self._heartbeat_s = now_s + HEARTBEAT_S
         if early:
             return False
-        missed = now_s >= self._due_s + _GRACE_S
-        self._due_s = (now_s if missed else self._due_s) + PERIOD_S
+        missed = now_s >= self._due_s + grace_s
+        self._due_s = (now_s if missed else self._due_s) + period_s
         for name, arm in arms.items():
             self._arms[name].say_where(arm, tick)
         return True
