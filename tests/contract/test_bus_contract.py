@@ -211,6 +211,28 @@ def test_who_looks_now_and_then_sees_the_last_few_in_order(open_bus: Open, liste
     assert 3 <= len(told) <= 6
 
 
+def test_who_pauses_hears_nothing_of_meanwhile_and_then_again(open_bus: Open, listen: Listen):
+    seen, heard = listen(), listen()
+    monitor, publisher = open_bus("monitor/1"), open_bus("recorder/1").publisher(RECORDER_STATUS)
+    recent = monitor.recent(RECORDER_STATUS, 10)
+    monitor.subscribe(RECORDER_STATUS, heard)
+
+    def look() -> None:
+        for found in recent.take():
+            seen(found)
+
+    put_until(lambda: (publisher.put(status(0)), look()), seen)
+    recent.pause()
+    recent.pause()
+    publisher.put(status(1))
+    put_until(lambda: None, heard, lambda got: got[-1].messages == 1)
+    look()
+    recent.resume()
+    recent.resume()
+    put_until(lambda: (publisher.put(status(2)), look()), seen, lambda got: got[-1].messages == 2)
+    assert {one.messages for one in seen} == {0, 2}
+
+
 def test_what_is_looked_at_and_does_not_fit_is_reported(open_bus: Open, listen: Listen):
     refused = listen()
     recent = open_bus("monitor/1", on_malformed=refused).recent(RECORDER_STATUS, 1)

@@ -1,11 +1,14 @@
 """What the page hears, in the order in which it counts."""
 
+from collections.abc import Callable
+
 import pytest
 
-from fras_common.bus import MemoryBus, MemoryFabric
-from fras_common.messages import Holds
+from fras_common.bus import Call, MemoryBus, MemoryFabric
+from fras_common.codec import encode
+from fras_common.messages import Header, Holds, LastReply, LastRequest
 from fras_common.service import ServiceHost
-from fras_common.topics import HOLDS, ROBOT_STATE, VERDICT
+from fras_common.topics import HOLDS, RECORDER_LAST, ROBOT_STATE, TISSUE_STATE, VERDICT
 from fras_monitor.listening import VERDICTS, Listener
 from fras_monitor.view import holds_of
 from support import pictures as p
@@ -60,3 +63,48 @@ def test_every_verdict_between_two_looks_is_a_point_and_of_states_the_latest_cou
     assert picture.trace.samples[0].tick == 1
     assert picture.trace.samples[-1].tick >= VERDICTS - 1
     assert listener.look() is picture
+
+
+def answering(last: dict[str, Header]) -> Callable[[Call[LastRequest, LastReply]], None]:
+    """Answer as the recorder does."""
+
+    def answer(call: Call[LastRequest, LastReply]) -> None:
+        message = last.get(call.request.key)
+        call.reply(LastReply(payload=encode(message) if message is not None else b""))
+
+    return answer
+
+
+def test_states_that_came_while_none_were_heard_are_looked_up(
+    fabric: MemoryFabric, motion: MemoryBus, listener: Listener
+):
+    robot = motion.publisher(ROBOT_STATE)
+    tissue = MemoryBus(fabric, "cell", "sim/1").publisher(TISSUE_STATE)
+    verdict = MemoryBus(fabric, "cell", "sa/1").publisher(VERDICT)
+    last: dict[str, Header] = {}
+    MemoryBus(fabric, "cell", "recorder/1").serve(RECORDER_LAST, answering(last))
+
+    def tick(number: int) -> None:
+        last[ROBOT_STATE.key] = robot.put(p.robot(tick=number))
+        last[TISSUE_STATE.key] = tissue.put(p.tissue(tick=number))
+        verdict.put(p.verdict(tick=number))
+
+    def shown() -> list[int]:
+        picture = listener.look()
+        heard = (picture.robot, picture.tissue, picture.verdict)
+        return [one.message.tick for one in heard if one is not None]
+
+    tick(1)
+    assert shown() == [1, 1, 1]
+    listener.hear(sparingly=True)
+    tick(2)
+    assert shown() == [1, 1, 2]
+    assert listener.resume()
+    assert not listener.resume()
+    assert shown() == [1, 1, 2]
+    tick(3)
+    assert shown() == [3, 3, 3]
+    listener.hear(sparingly=True)
+    tick(4)
+    listener.hear(sparingly=False)
+    assert shown() == [4, 4, 4]

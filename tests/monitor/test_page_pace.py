@@ -34,5 +34,16 @@ def test_a_trial_that_begins_anew_or_stands_is_drawn_as_often_as_ever():
     frames.drawn(100.0, TOOK_S, 50.0)
     frames.drawn(100.1, TOOK_S, 0.0)
     assert frames.wait_s(100.1) == pytest.approx(FRAME_S)
+    assert not frames.fast
     frames.drawn(100.2, TOOK_S, 0.0)
     assert frames.wait_s(100.2) == pytest.approx(FRAME_S)
+    frames.drawn(100.3, TOOK_S, 0.5)
+    assert frames.fast
+
+
+def test_a_glance_is_waited_for_and_no_longer():
+    frames = Frames()
+    frames.drawn(100.0, TOOK_S, 0.0)
+    wait_s = frames.glance(101.0)
+    assert 0.0 < wait_s < FRAME_S
+    assert frames.wait_s(101.0) == pytest.approx(wait_s)

@@ -108,6 +108,22 @@ def test_a_press_holds_the_arms_by_the_pages_name(fabric: MemoryFabric, pressed:
     assert record.at_rest_s >= record.acknowledged_s
 
 
+def test_who_hears_sparingly_hears_each_state_from_the_press_on(
+    fabric: MemoryFabric, pressed: Pressed
+):
+    motion = Motion(fabric)
+    motion.serve()
+    robot = motion.bus.publisher(ROBOT_STATE)
+    pressed.stopper.hear(sparingly=True)
+    # Not heard: else it would be taken for the end of the next stop.
+    robot.put(p.robot(phase="held", holds=HELD))
+    pressed.stopper.press()
+    pressed.until("acknowledged")
+    pressed.stopper.hear(sparingly=True)
+    robot.put(p.robot(phase="held", holds=HELD))
+    pressed.until("at_rest")
+
+
 def test_arms_that_stand_are_seen_though_every_answer_is_lost(
     fabric: MemoryFabric, pressed: Pressed
 ):

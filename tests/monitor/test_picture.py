@@ -1,8 +1,9 @@
 """What is known: the latest of each key, of one trial, whatever the order in which keys arrive."""
 
+import msgspec
 import pytest
 
-from fras_common.messages import Holds, ReplayMark, ReplayStatus
+from fras_common.messages import Holds, ReplayMark, ReplayStatus, RobotState
 from fras_monitor.mail import WAITING, Mail
 from fras_monitor.picture import PLANS_KEPT, Picture, apply, remembered, with_token
 from fras_monitor.stop import StopRecord
@@ -37,9 +38,16 @@ def test_plans_are_bounded():
     assert picture.plans[-1].request_id == f"c{PLANS_KEPT + 4}"
 
 
-def test_what_the_recorder_remembers_never_replaces_what_was_heard():
-    heard = p.picture_of(p.robot(tick=7))
-    assert remembered(heard, p.robot(tick=3)) is heard
+def test_what_the_recorder_remembers_replaces_only_what_was_said_before_it():
+    def said(tick: int) -> RobotState:
+        return msgspec.structs.replace(p.robot(tick=tick), stamp_ns=tick)
+
+    heard = p.picture_of(said(7))
+    assert remembered(heard, said(3)) is heard
+    assert remembered(heard, said(7)) is heard
+    later = remembered(heard, said(8))
+    assert later.robot is not None
+    assert later.robot.message.tick == 8
     filled = remembered(Picture(), p.robot(tick=3))
     assert filled.robot is not None
     assert filled.robot.message.tick == 3

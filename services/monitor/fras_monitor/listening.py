@@ -38,8 +38,9 @@ LATEST: Final[tuple[Topic[Any], ...]] = (TISSUE_MODEL, CONTEXT, RECORDER_STATUS)
 EACH: Final[tuple[Topic[Any], ...]] = (
     PLAN, TASK_STATUS, ACTION_RESULT, HOLDS, SUPERVISOR_STATUS,
 )  # fmt: skip
+STATES: Final[tuple[Topic[Any], ...]] = (TISSUE_STATE, ROBOT_STATE)
 # Not latched: who opens the page between two actions would see nothing of them.
-MISSED: Final[tuple[Topic[Any], ...]] = (TISSUE_STATE, ROBOT_STATE, VERDICT, CONTEXT)
+MISSED: Final[tuple[Topic[Any], ...]] = (*STATES, VERDICT, CONTEXT)
 
 
 @dataclass(frozen=True)
@@ -73,16 +74,12 @@ class Listener:
         for topic in EACH:
             bus.subscribe(topic, self.note)
         # Said each tick, which may be far more often than anything is drawn: looked at before that.
-        self._each_tick: tuple[Recent[m.Header], ...] = (
-            bus.recent(TISSUE_STATE, 1),
-            bus.recent(ROBOT_STATE, 1),
-            bus.recent(VERDICT, VERDICTS),
-        )
+        self._states: tuple[Recent[m.Header], ...] = tuple(bus.recent(one, 1) for one in STATES)
+        self._verdicts = bus.recent(VERDICT, VERDICTS)
+        self._pauses = self._is_sparing = False
         bus.subscribe(HEALTH, self._on_health)
         bus.watch_tokens(lambda name, present: self.note(_Token(name, present)))
-        for topic in MISSED:
-            request = m.LastRequest(key=topic.key)
-            bus.ask(RECORDER_LAST, request, self._take_last(topic), ANSWER_S)
+        self._catch_up(*MISSED)
 
     def note(self, message: object) -> None:
         """Take in a message, or an answer to a question of the page; on any thread."""
@@ -90,7 +87,7 @@ class Listener:
 
     def look(self) -> Picture:
         """Take in what has arrived, and return all that is known."""
-        for recent in self._each_tick:
+        for recent in (*self._states, self._verdicts):
             for message in recent.take():
                 # At some time since then: of a state and the holds, which motion says as they
                 # change, what was heard meanwhile is the later word.
@@ -101,6 +98,35 @@ class Listener:
         self._host.counts["received"] = self._mail.received
         self._host.counts["queue_dropped"] = self._mail.dropped
         return self.picture
+
+    def hear(self, *, sparingly: bool) -> None:
+        """Hear each state, or none until `resume`: most would be replaced before the next picture.
+
+        Who hears each again is told by the recorder of those that came meanwhile.
+        """
+        if sparingly:
+            self._pauses = True
+            for recent in self._states:
+                recent.pause()
+        elif self._is_sparing:
+            self.resume()
+            self._catch_up(*STATES)
+        self._is_sparing = sparingly
+
+    def resume(self) -> bool:
+        """Hear them again; whether they were not heard."""
+        if not self._pauses:
+            return False
+        for recent in self._states:
+            recent.resume()
+        self._looked_s = time.monotonic()
+        self._pauses = False
+        return True
+
+    def _catch_up(self, *topics: Topic[Any]) -> None:
+        for topic in topics:
+            request = m.LastRequest(key=topic.key)
+            self._host.bus.ask(RECORDER_LAST, request, self._take_last(topic), ANSWER_S)
 
     def _keep_latest(self, key: str) -> Callable[[m.Header], None]:
         return lambda message: self._mail.replace(key, message, time.monotonic())

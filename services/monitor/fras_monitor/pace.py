@@ -9,7 +9,9 @@ NICENESS: Final = 10
 FRAME_S: Final = 0.05
 FAST: Final = 1.5
 """Simulated seconds in one of ours from which on a trial counts as run faster than life."""
-SHARE: Final = 0.04
+GLANCE_S: Final = 0.02
+"""A tick or two of such a trial."""
+SHARE: Final = 0.02
 """Of one processor: what drawing such a trial may take."""
 
 
@@ -50,11 +52,17 @@ class Frames:
     Such a trial is waited for rather than followed, and takes all that the machine has: there
     drawing keeps to its share, and ticks come first. At the pace of life processors idle between
     two ticks, and each picture is drawn.
+
+    Attributes
+    ----------
+    fast : bool
+        Whether the trial ran faster than life between the last two pictures.
     """
 
     def __init__(self) -> None:
         self._next_s = self._drawn_s = 0.0
         self._simulated_s = 0.0
+        self.fast = False
 
     def wait_s(self, now_s: float) -> float:
         """Seconds until it is due."""
@@ -73,6 +81,12 @@ class Frames:
             Up to where the trial had come.
         """
         since_s, went_s = now_s - self._drawn_s, simulated_s - self._simulated_s
-        period_s = max(FRAME_S, took_s / SHARE) if went_s > FAST * since_s else FRAME_S
+        self.fast = went_s > FAST * since_s
+        period_s = max(FRAME_S, took_s / SHARE) if self.fast else FRAME_S
         self._drawn_s, self._simulated_s = now_s, simulated_s
         self._next_s = now_s + period_s
+
+    def glance(self, now_s: float) -> float:
+        """Have the next picture wait for something to draw, and return for how long [s]."""
+        self._next_s = now_s + GLANCE_S
+        return GLANCE_S

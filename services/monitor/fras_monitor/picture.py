@@ -107,10 +107,14 @@ class Picture:
         return model.dt_s if model is not None else 0.0
 
     @property
+    def tick(self) -> int:
+        """That of the arms' last state; -1 before any."""
+        return self.robot.message.tick if self.robot is not None else -1
+
+    @property
     def simulated_s(self) -> float:
         """Up to where the arms have come in the trial."""
-        robot = self.of_trial(self.robot)
-        return robot.tick * self.dt_s if robot is not None else 0.0
+        return self.tick * self.dt_s if self.of_trial(self.robot) is not None else 0.0
 
     def of_trial(self, heard: "Heard[H] | None") -> "H | None":
         """Return a message if it belongs to the current trial."""
@@ -174,9 +178,13 @@ def apply(picture: Picture, message: object, now_s: float) -> Picture:
 
 
 def remembered(picture: Picture, message: object) -> Picture:
-    """Take in what the recorder remembers: it counts only where nothing has been heard yet."""
+    """Take in what the recorder remembers: it counts only where nothing later has been heard."""
     name = _LATEST.get(type(message), "")
-    return apply(picture, message, 0.0) if name and getattr(picture, name) is None else picture
+    if not name or not isinstance(message, Header):
+        return picture
+    heard: Heard[Header] | None = getattr(picture, name)
+    is_news = heard is None or heard.message.stamp_ns < message.stamp_ns
+    return apply(picture, message, 0.0) if is_news else picture
 
 
 def with_token(picture: Picture, token: str, present: bool) -> Picture:

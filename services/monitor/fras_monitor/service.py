@@ -98,8 +98,10 @@ class MonitorService:
         now_s, began_s = time.monotonic(), time.thread_time()
         if (wait_s := self._frames.wait_s(now_s)) > 0.0:
             return wait_s
+        if self._listener.resume():
+            return self._frames.glance(now_s)
         picture = self._listener.look()
-        self._host.tick = picture.robot.message.tick if picture.robot is not None else -1
+        self._host.tick = picture.tick
         if picture.holds is not None:
             self.stopper.see_holds(picture.holds.message.holds, picture.holds.at_s)
         self._audience.tell(self._hub, self.address, now_s)
@@ -107,6 +109,10 @@ class MonitorService:
             self._show(picture, now_s)
         self._scene.draw(picture)
         self._frames.drawn(now_s, time.thread_time() - began_s, picture.simulated_s)
+        # A replay has no recorder that would tell the last of the states that were not heard.
+        sparingly = self._frames.fast and not picture.is_replay
+        self._listener.hear(sparingly=sparingly)
+        self.stopper.hear(sparingly=sparingly)
         return self._frames.wait_s(time.monotonic())
 
     def _show(self, picture: Picture, now_s: float) -> None:

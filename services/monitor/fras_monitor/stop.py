@@ -121,7 +121,17 @@ class Stopper:
     def press(self) -> None:
         """Stop the arms; returns at once. Pressed again, motion is asked again."""
         self._change(lambda _: StopRecord(pressed_s=self._clock(), state="sent"))
+        with self._lock:
+            self._robot.resume()
         self._presses.put(True)
+
+    def hear(self, *, sparingly: bool) -> None:
+        """Hear each state of the arms; or, as they move and so say more, none until a press."""
+        with self._lock:
+            if not sparingly:
+                self._robot.resume()
+            elif self._record.state not in ("sent", "acknowledged"):
+                self._robot.pause()
 
     def see_holds(self, holds: Mapping[str, str], at_s: float) -> None:
         """Forget the last press if somebody else has lifted it, at a terminal say.

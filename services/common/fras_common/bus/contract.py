@@ -89,6 +89,14 @@ class Recent(Protocol[M_co]):
         """Return the messages since the last look, oldest first."""
         ...
 
+    def pause(self) -> None:
+        """Hear nothing, and forget what was not looked at; costs nobody anything. Idempotent."""
+        ...
+
+    def resume(self) -> None:
+        """Hear again what is said from now on. Idempotent."""
+        ...
+
 
 class Call(Protocol[Req_co, Rep_contra]):
     """A query that waits for its answer; exactly one of `reply` and `fail` must be called."""

@@ -104,9 +104,9 @@ class MemoryBus:
 
     def recent(self, topic: Topic[M], at_most: int) -> Kept[M]:
         """Look now and then at what came on a concrete key."""
-        kept = deque[RawSample](maxlen=at_most)
-        self._subscribe(topic.key, kept.append, history=0)
-        return Kept(topic, lambda: [kept.popleft() for _ in range(len(kept))], self._on_malformed)
+        ring = _Ring(at_most)
+        self._subscribe(topic.key, ring.note, history=0)
+        return Kept(topic, ring, self._on_malformed)
 
     def subscribe_raw(self, key_expr: str, callback: Callable[[RawSample], None]) -> None:
         """Receive samples undecoded, from now on."""
@@ -269,6 +269,26 @@ class MemoryBus:
     def _require_open(self) -> None:
         if self._closed:
             raise BusClosed("this bus is closed: open a new one")
+
+
+class _Ring:
+    def __init__(self, at_most: int) -> None:
+        self._kept = deque[RawSample](maxlen=at_most)
+        self._hears = True
+
+    def note(self, sample: RawSample) -> None:
+        if self._hears:
+            self._kept.append(sample)
+
+    def take(self) -> list[RawSample]:
+        return [self._kept.popleft() for _ in range(len(self._kept))]
+
+    def pause(self) -> None:
+        self._hears = False
+        self._kept.clear()
+
+    def resume(self) -> None:
+        self._hears = True
 
 
 class _MemoryPublisher(Generic[M]):

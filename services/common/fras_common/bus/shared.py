@@ -2,8 +2,8 @@
 
 import itertools
 import threading
-from collections.abc import Callable
-from typing import Any, Generic, TypeVar
+from collections.abc import Callable, Iterable
+from typing import Any, Generic, Protocol, TypeVar
 
 import msgspec
 
@@ -71,29 +71,50 @@ def decoding(
     return deliver
 
 
+class Samples(Protocol):
+    """What came on a key: the last ones, undecoded."""
+
+    def take(self) -> Iterable[RawSample]:
+        """Give those since the last time, oldest first."""
+        ...
+
+    def pause(self) -> None:
+        """Hear nothing, and forget what was not taken."""
+        ...
+
+    def resume(self) -> None:
+        """Hear again."""
+        ...
+
+
 class Kept(Generic[M]):
     """Decodes what came on a key, once it is looked at.
 
     Parameters
     ----------
     topic : Topic
-    take : callable
-        Gives the samples since the last time, oldest first.
+    samples : Samples
     on_malformed : callable
         Gets a payload that did not fit.
     """
 
-    def __init__(
-        self, topic: Topic[M], take: Callable[[], list[RawSample]], on_malformed: OnMalformed
-    ) -> None:
+    def __init__(self, topic: Topic[M], samples: Samples, on_malformed: OnMalformed) -> None:
         self._topic = topic
-        self._take = take
+        self._samples = samples
         self._on_malformed = on_malformed
+
+    def pause(self) -> None:
+        """Hear nothing, and forget what was not looked at."""
+        self._samples.pause()
+
+    def resume(self) -> None:
+        """Hear again what is said from now on."""
+        self._samples.resume()
 
     def take(self) -> list[M]:
         """Return the messages since the last look, oldest first."""
         taken: list[M] = []
-        for sample in self._take():
+        for sample in self._samples.take():
             try:
                 taken.append(received(self._topic, sample.payload, sample.key))
             except MalformedMessage as error:

@@ -12,7 +12,7 @@ while it replies: who asks a cache lets it drop, and asks again.
 
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any, Generic, TypeVar, cast
 
 import zenoh
@@ -30,6 +30,7 @@ from fras_common.bus.past import CACHES, Beat, Cached, Past
 from fras_common.bus.recovery import ALL_OF_WHO_BEGINS, Earlier
 from fras_common.bus.settings import NoRouter, client_settings
 from fras_common.bus.shared import Answer, Kept, Stamper, decoding, wait_for
+from fras_common.bus.zenoh_ring import Ring
 from fras_common.bus.zenoh_wire import ENCODING, ZenohCall, beat, configured, numbered, outcome, raw
 from fras_common.codec import MalformedMessage, decode, encode
 from fras_common.errors import FrasError
@@ -38,6 +39,7 @@ from fras_common.keeping import beat_s_of, kept_of
 from fras_common.messages import Header
 from fras_common.topics import Qos, Query, Topic
 
+T = TypeVar("T")
 M = TypeVar("M", bound=Header)
 Req = TypeVar("Req")
 Rep = TypeVar("Rep")
@@ -164,23 +166,12 @@ class ZenohBus:
     def recent(self, topic: Topic[M], at_most: int) -> Kept[M]:
         """Look now and then at what came on a concrete key."""
         self.require_open()
-        ring = self._ring(topic.key, at_most)
-        return Kept(topic, lambda: [raw(one) for one in ring()], self._on_malformed)
+        return Kept(topic, self._ring(topic.key, at_most, raw), self._on_malformed)
 
-    def _ring(self, key_expr: str, at_most: int) -> Callable[[], Iterator[zenoh.Sample]]:
-        """Have Zenoh keep what comes, without a word to us: to be taken, oldest first."""
-        kept = cast(Any, zenoh.handlers.RingChannel(at_most))
-        declared: Any = self._session.declare_subscriber(key_expr, kept)
-        self._declared.append(declared)
-
-        def take() -> Iterator[zenoh.Sample]:
-            # Somebody else may say more as fast as it is taken.
-            for _ in range(at_most):
-                if self._closed or (sample := declared.try_recv()) is None:
-                    return
-                yield sample
-
-        return take
+    def _ring(self, key_expr: str, at_most: int, read: Callable[[zenoh.Sample], T]) -> Ring[T]:
+        ring = Ring(self._session, key_expr, at_most, read)
+        self._declared.append(ring)
+        return ring
 
     def subscribe_raw(self, key_expr: str, callback: Callable[[RawSample], None]) -> None:
         """Receive samples undecoded, from now on."""
@@ -188,10 +179,10 @@ class ZenohBus:
 
     def _hear(self, key_expr: str, callback: Callable[[RawSample], None], earlier: Earlier) -> None:
         self.require_open()
-        beats = self._ring(f"{key_expr}{CACHES}**", BEATS)
+        beats = self._ring(f"{key_expr}{CACHES}**", BEATS, beat)
 
-        def take_beats() -> Iterator[Beat]:
-            return (found for one in beats() if (found := beat(one)) is not None)
+        def take_beats() -> list[Beat]:
+            return [one for one in beats.take() if one is not None]
 
         hearing = Hearing(self._asker, self._get_cached, take_beats, callback, earlier)
 
