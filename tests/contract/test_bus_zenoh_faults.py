@@ -92,6 +92,19 @@ def line_of(process: subprocess.Popen[str]) -> list[str]:
     return lines
 
 
+def put_until_heard(publisher: Any, heard: Any, also: Callable[[], bool] = lambda: True) -> None:
+    """Nothing of before a subscription is heard, and only the router knows when that was."""
+    deadline = time.monotonic() + 20.0
+    while not (heard and also()):
+        assert time.monotonic() < deadline, "never heard"
+        before = len(heard)
+        publisher.put(LogRecord(level="", event="warm-up", fields={}))
+        try:
+            heard.until(lambda got, before=before: len(got) > before, timeout_s=0.05)
+        except AssertionError:
+            continue
+
+
 def test_a_frozen_subscriber_blocks_nobody_and_misses_nothing(
     router: Any, listener: tuple[str, subprocess.Popen[str]], listen: Listen
 ):
@@ -103,14 +116,7 @@ def test_a_frozen_subscriber_blocks_nobody_and_misses_nothing(
         hearing.subscribe(SIM_LOG, heard)
         publisher = publishing.publisher(SIM_LOG)
         said = line_of(process)
-        deadline = time.monotonic() + 20.0
-        while not (said and heard) and time.monotonic() < deadline:
-            before = len(heard)
-            publisher.put(LogRecord(level="", event="warm-up", fields={}))
-            try:
-                heard.until(lambda got, before=before: len(got) > before, timeout_s=0.05)
-            except AssertionError:
-                continue
+        put_until_heard(publisher, heard, lambda: bool(said))
         assert said == ["hearing\n"]
 
         process.send_signal(signal.SIGSTOP)
@@ -162,6 +168,7 @@ def test_who_freezes_as_a_cache_answers_blocks_nobody(
         for _ in range(FROZEN_PUTS):
             publisher.put(LogRecord(level="", event="big", fields={"data": BIG}))
         hearing.subscribe(SIM_LOG, heard)
+        put_until_heard(publisher, heard)
         asker = frozen(cell)
         assert longest_way(publisher, heard, lambda: stands_still(asker)) < 1.0
     finally:

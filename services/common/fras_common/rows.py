@@ -60,7 +60,7 @@ class Topic(Generic[M]):
     kept : int
         How many the publisher keeps for who lost them or comes late, and the recorder remembers.
     awaited : bool
-        A trial stands still until it has come: who lost the last one is to learn so at once.
+        Somebody does nothing until it has come: who lost the last one is to learn so at once.
     """
 
     key: str

@@ -39,7 +39,7 @@ class TissueTopics:
         """Make the rows of a simulator."""
         model = Topic(
             f"{service}/tissue_model", m.TissueModel, service, Qos.EVENT, "each reset",
-            max_bytes=BULK, kept=FEW,
+            max_bytes=BULK, kept=FEW, awaited=True,
         )  # fmt: skip
         state = Topic(
             f"{service}/tissue_state", m.TissueState, service, Qos.STATE, "each tick",
@@ -67,15 +67,17 @@ VERDICT = Topic("sa/verdict", m.Verdict, "sa", Qos.STATE, "each tick", awaited=T
 CONTEXT = Topic("sa/context", m.Context, "sa", Qos.EVENT, "on request", max_bytes=WORDY, kept=SOME)
 PLAN = Topic("planner/plan", m.Plan, "planner", Qos.EVENT, "each plan", max_bytes=WORDY, kept=SOME)
 TASK_STATUS = Topic(
-    "planner/task_status", m.TaskStatus, "planner", Qos.EVENT, "each change", in_trial=False
-)
+    "planner/task_status", m.TaskStatus, "planner", Qos.EVENT, "each change", in_trial=False,
+    awaited=True,
+)  # fmt: skip
 ACTION_RESULT = Topic(
-    "motion/action_result", m.ActionResult, "motion", Qos.EVENT, "end of each action"
+    "motion/action_result", m.ActionResult, "motion", Qos.EVENT, "end of each action", awaited=True
 )
 HOLDS = Topic("motion/holds", m.Holds, "motion", Qos.EVENT, "each change", in_trial=False)
 RECORDER_STATUS = Topic(
-    "recorder/status", m.RecorderStatus, "recorder", Qos.EVENT, "each change", in_trial=False
-)
+    "recorder/status", m.RecorderStatus, "recorder", Qos.EVENT, "each change", in_trial=False,
+    awaited=True,
+)  # fmt: skip
 RECORDER_EVENT = Topic(
     "recorder/event", m.RecorderEvent, "recorder", Qos.STATE, "each", in_trial=False
 )
