@@ -74,7 +74,10 @@ class Listener:
         for topic in EACH:
             bus.subscribe(topic, self.note)
         # Said each tick, which may be far more often than anything is drawn: looked at before that.
-        self._states: tuple[Recent[m.Header], ...] = tuple(bus.recent(one, 1) for one in STATES)
+        self._states: tuple[Recent[m.Header], ...] = (
+            bus.recent(TISSUE_STATE, 1),
+            bus.recent(ROBOT_STATE, 1),
+        )
         self._verdicts = bus.recent(VERDICT, VERDICTS)
         self._pauses = self._is_sparing = False
         bus.subscribe(HEALTH, self._on_health)
