@@ -117,6 +117,8 @@ def test_one_and_many_are_told_apart(said: str, told: str):
         ("threshold_fraction", 0.995, "needed: more than 99.5%"),
         ("max_force_n", 0.51234, "max force 0.51 N"),
         ("fixed_points", 42.0, "attachments under it 42"),
+        ("roi_offset_x_m", 0.0129, "the target region lies behind it by 12.9 mm"),
+        ("rest_y_m", 0.0086, "from the right edge, at rest 8.6 mm"),
     ],
 )
 def test_evidence_has_units(name: str, value: float, told: str):

@@ -95,7 +95,8 @@ _EVIDENCE: Final[Mapping[str, tuple[str, float]]] = {
     "_s": ("s", 1.0),
 }
 
-# What a number is, without the unit at the end of its name.
+# What a number is, without the unit at the end of its name. As the scene is seen at first, x leads
+# away from whoever looks and y from right to left.
 _MEASURES: Final[Mapping[str, str]] = {
     "visible": "lifted clear",
     "threshold": "needed: more than",
@@ -103,13 +104,13 @@ _MEASURES: Final[Mapping[str, str]] = {
     "at_distance": "counts as there up to",
     "jaw": "jaws at",
     "closed_jaw": "count as closed up to",
-    "roi_offset_x": "from the target region in x",
-    "roi_offset_y": "in y",
-    "half_cell_x": "counts as above it up to x",
-    "half_cell_y": "y",
+    "roi_offset_x": "the target region lies behind it by",
+    "roi_offset_y": "and to the left by",
+    "half_cell_x": "counts as above it up to, behind or in front",
+    "half_cell_y": "left or right",
     "fixed_points": "attachments under it",
-    "rest_y": "y at rest",
-    "middle_y": "middle of the tissue y",
+    "rest_y": "from the right edge, at rest",
+    "middle_y": "middle of the tissue",
 }
 
 _BLOCK: Final = re.compile(r"b\((\d+),\s*(\d+)\)")
