@@ -1,10 +1,11 @@
-"""Effects that wait for nothing but time."""
+"""Effects that wait: for time, or for the end of an action."""
 
 from collections.abc import Generator
 from typing import Any, cast
 
 from fras_common.errors import FrasError
-from fras_planner.effects import Effect, Pause
+from fras_common.messages import ActionResult
+from fras_planner.effects import AwaitResult, Effect, Pause
 from fras_planner.performer import Performer
 
 
@@ -42,3 +43,32 @@ def test_a_pause_ends_by_the_clock_and_tells_for_whom_it_is():
     waiting.wake()
     assert ends == [None]
     assert (waiting.missing, waiting.wake()) == ("", None)
+
+
+def ended(goal_id: str, tick: int) -> ActionResult:
+    return ActionResult(
+        tick=tick, trial="t", goal_id=goal_id, name="reach", arm="psm1", block="b(1,1)",
+        outcome="succeeded", reason="",
+    )  # fmt: skip
+
+
+def test_an_end_that_came_before_the_beginning_is_known_and_that_of_another_trial_is_not():
+    taken = list[int]()
+
+    def steps() -> Generator[Effect, Any, None]:
+        result: ActionResult = yield AwaitResult("g1")
+        taken.append(result.tick)
+
+    waiting = performer(Clock(), [])
+    waiting.deliver(ended("g1", 7))
+    waiting.forget_results()
+    waiting.start(steps())
+    assert waiting.awaited == "g1"
+    assert taken == []
+    waiting.forget_results()
+    waiting.deliver(ended("g1", 8))
+    waiting.start(steps())
+    assert taken == [8]
+    waiting.forget_results()
+    waiting.start(steps(), result=ended("g1", 9))
+    assert taken == [8, 9]

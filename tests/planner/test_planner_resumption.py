@@ -7,7 +7,7 @@ from typing import Any
 import msgspec
 import pytest
 
-from fras_common.bus import Call, MemoryFabric
+from fras_common.bus import Call, MemoryBus, MemoryFabric
 from fras_common.codec import content_digest
 from fras_common.errors import FrasError
 from fras_common.messages import (
@@ -140,6 +140,19 @@ def test_an_action_that_has_ended_meanwhile_or_moves_was_begun(
         theatre.bench.peers(ACTION_RESULT).put(result())
     theatre.until(lambda: theatre.asked)
     assert theatre.asked[0].min_tick == 40
+
+
+def test_an_action_that_ends_while_the_trial_is_recalled_has_ended(theatre: Theatre) -> None:
+    """Between the answer that there is no result yet and the moment in which one is waited for."""
+    acting(theatre)
+    executed(theatre, accepted=True)
+    motion = MemoryBus(theatre.fabric, "cell", "motion/test").publisher(ACTION_RESULT)
+    theatre.recorder.then[ACTION_RESULT.key] = lambda: motion.put(result())
+    theatre.start()
+    theatre.note(SA_CONTEXT)
+    theatre.until(lambda: theatre.asked)
+    assert theatre.asked[0].min_tick == 40
+    assert theatre.statuses[-1].actions == [REACH]
 
 
 @pytest.mark.parametrize("asked", [True, False])

@@ -1,5 +1,6 @@
 """A client that remembers what was said and tells it, as the recorder does."""
 
+from collections.abc import Callable
 from typing import Any
 
 import msgspec
@@ -26,6 +27,8 @@ class Remembering:
         self.memory = Memory()
         self.asked: list[str] = []
         self.silent = False
+        # By key: what happens once its last message has been told.
+        self.then: dict[str, Callable[[], object]] = {}
         self._unanswered: list[Call[LastRequest, LastReply]] = []
         self.bus = MemoryBus(fabric, "cell", "recorder/test")
         self.bus.subscribe_raw("**", self._note)
@@ -44,6 +47,8 @@ class Remembering:
             self._unanswered.append(call)
             return
         call.reply(LastReply(payload=self.memory.last(call.request.key)))
+        if (then := self.then.pop(call.request.key, None)) is not None:
+            then()
 
     def _since(self, call: Call[SinceRequest, SinceReply]) -> None:
         self.asked.append(call.request.key)

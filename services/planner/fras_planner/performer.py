@@ -86,13 +86,18 @@ class Performer:
         patience_s : float
             For how long a service may be away before a question to it fails.
         result : ActionResult, optional
-            One that has come already.
+            One that has come already; what was delivered since `forget_results` is known, too.
         """
         self._steps = steps
         self._patience_s = patience_s
-        self._results = {result.goal_id: result} if result is not None else {}
+        if result is not None:
+            self._results.setdefault(result.goal_id, result)
         self.awaited = ""
         self.drive(None)
+
+    def forget_results(self) -> None:
+        """Know of no action that has ended: another trial begins, whose goals are called alike."""
+        self._results.clear()
 
     @property
     def missing(self) -> str:

@@ -97,6 +97,8 @@ class PlannerService:
         self._executive, self._plans = executive, plans
         self._log.begin(executive, required=scenario.run.require_log)
         self._motion.begin(scenario.run.peer_timeout_s)
+        self._performer.forget_results()
+        # What came of the trial already is handed out here: the end of an action among it.
         self._host.enter_trial(request.trial)
         return executive, plans
 
