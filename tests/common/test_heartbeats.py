@@ -22,7 +22,7 @@ from fras_common.topics import (
 
 AWAITED = [
     *(ROBOT_STATE, TISSUE_STATE, PATIENT.state, VERDICT),
-    *(TISSUE_MODEL, TASK_STATUS, ACTION_RESULT, RECORDER_STATUS),
+    *(TISSUE_MODEL, TASK_STATUS, ACTION_RESULT, RECORDER_STATUS, CRTK[0].operating_state),
 ]
 UNHURRIED = [
     *(SIM_CHECKPOINT.key, CRTK[0].measured_js.key, CRTK[1].jaw_setpoint_js.key),

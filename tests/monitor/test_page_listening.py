@@ -1,6 +1,7 @@
 """What the page hears, in the order in which it counts."""
 
 from collections.abc import Callable
+from types import SimpleNamespace
 
 import pytest
 
@@ -9,7 +10,8 @@ from fras_common.codec import encode
 from fras_common.messages import Header, Holds, LastReply, LastRequest
 from fras_common.service import ServiceHost
 from fras_common.topics import HOLDS, RECORDER_LAST, ROBOT_STATE, TISSUE_STATE, VERDICT
-from fras_monitor.listening import VERDICTS, Listener
+from fras_monitor import listening
+from fras_monitor.listening import MOST_GLANCE_S, VERDICTS, Listener
 from fras_monitor.view import holds_of
 from support import pictures as p
 
@@ -99,12 +101,44 @@ def test_states_that_came_while_none_were_heard_are_looked_up(
     listener.hear(sparingly=True)
     tick(2)
     assert shown() == [1, 1, 2]
-    assert listener.resume()
-    assert not listener.resume()
-    assert shown() == [1, 1, 2]
+    assert not listener.has_states(now_s=10.0)
     tick(3)
+    assert listener.has_states(now_s=10.01)
     assert shown() == [3, 3, 3]
     listener.hear(sparingly=True)
     tick(4)
+    assert shown() == [3, 3, 4]
+    assert not listener.has_states(now_s=20.0)
+    # Nothing comes any more: what is there is drawn, and the last states are asked for.
+    assert not listener.has_states(now_s=20.05)
+    assert listener.has_states(now_s=20.0 + MOST_GLANCE_S)
     listener.hear(sparingly=False)
     assert shown() == [4, 4, 4]
+
+
+def test_states_that_nobody_could_tell_are_asked_for_again(
+    fabric: MemoryFabric, motion: MemoryBus, listener: Listener, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(listening, "time", clock := SimpleNamespace(monotonic=lambda: 100.0))
+    robot, last = motion.publisher(ROBOT_STATE), dict[str, Header]()
+    verdict = MemoryBus(fabric, "cell", "sa/1").publisher(VERDICT)
+
+    def shown() -> int:
+        picture = listener.look()
+        return picture.robot.message.tick if picture.robot is not None else -1
+
+    robot.put(p.robot(tick=1))
+    listener.look()
+    listener.hear(sparingly=True)
+    last[ROBOT_STATE.key] = robot.put(p.robot(tick=2))
+    verdict.put(p.verdict(tick=2))
+    assert listener.has_states(0.0) or listener.has_states(MOST_GLANCE_S)
+    assert shown() == 1
+    listener.hear(sparingly=False)
+    assert shown() == 1
+    MemoryBus(fabric, "cell", "recorder/1").serve(RECORDER_LAST, answering(last))
+    listener.hear(sparingly=False)
+    assert shown() == 1
+    clock.monotonic = lambda: 101.0
+    listener.hear(sparingly=False)
+    assert shown() == 2

@@ -2,7 +2,7 @@
 
 import pytest
 
-from fras_monitor.pace import FRAME_S, SHARE, Frames
+from fras_monitor.pace import FRAME_S, MOST_S, SHARE, Frames
 
 TOOK_S = 0.004
 
@@ -23,6 +23,10 @@ def test_a_trial_at_the_pace_of_life_is_drawn_twenty_times_a_second_whatever_it_
 
 def test_one_that_runs_faster_takes_no_more_than_its_share_of_a_processor():
     assert run(5.0) * TOOK_S == pytest.approx(SHARE, rel=0.05)
+
+
+def test_one_that_runs_faster_is_drawn_twice_a_second_whatever_it_takes():
+    assert run(5.0, took_s=0.1) == pytest.approx(1.0 / MOST_S, rel=0.05)
 
 
 def test_one_that_runs_faster_is_drawn_as_often_where_that_is_cheap():

@@ -1,6 +1,7 @@
 """The stop: asked at once, asked again until it is taken, and told with the times it took."""
 
 import threading
+import time
 from collections.abc import Iterator
 
 import pytest
@@ -120,8 +121,11 @@ def test_who_hears_sparingly_hears_each_state_from_the_press_on(
     pressed.stopper.press()
     pressed.until("acknowledged")
     pressed.stopper.hear(sparingly=True)
+    said_s = time.monotonic()
     robot.put(p.robot(phase="held", holds=HELD))
-    pressed.until("at_rest")
+    at_rest_s = pressed.until("at_rest").at_rest_s
+    assert at_rest_s is not None
+    assert at_rest_s >= said_s
 
 
 def test_arms_that_stand_are_seen_though_every_answer_is_lost(

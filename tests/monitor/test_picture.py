@@ -45,12 +45,29 @@ def test_what_the_recorder_remembers_replaces_only_what_was_said_before_it():
     heard = p.picture_of(said(7))
     assert remembered(heard, said(3)) is heard
     assert remembered(heard, said(7)) is heard
+    # In a replay what a recorder remembers is of before.
+    replayed = with_token(heard, "alive/replay/1", present=True)
+    assert remembered(replayed, said(8)) is replayed
     later = remembered(heard, said(8))
     assert later.robot is not None
     assert later.robot.message.tick == 8
     filled = remembered(Picture(), p.robot(tick=3))
     assert filled.robot is not None
     assert filled.robot.message.tick == 3
+
+
+def test_what_was_not_heard_is_remembered_by_the_recorder_of_a_live_cell():
+    there = with_token(Picture(), "alive/recorder/1", present=True)
+    assert (Picture().is_remembered, there.is_remembered) == (False, True)
+    assert not with_token(there, "alive/replay/1", present=True).is_remembered
+
+
+def test_a_verdict_on_states_that_were_not_heard_leaves_them_behind():
+    picture = p.picture_of(p.task(), p.model(), p.robot(tick=4), p.tissue(tick=4))
+    assert not picture.is_behind
+    assert not apply(picture, p.verdict(tick=4), 1.0).is_behind
+    assert apply(picture, p.verdict(tick=5), 1.0).is_behind
+    assert not apply(picture, p.verdict(tick=5, trial="another"), 1.0).is_behind
 
 
 def test_a_type_that_no_key_carries_is_a_mistake_of_ours():

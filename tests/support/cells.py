@@ -5,6 +5,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from subprocess import Popen
@@ -15,6 +16,7 @@ from fras_cli.link import Link
 from fras_cli.options import build_trial
 from fras_cli.stack import UsedStack
 from fras_cli.trial import TrialFollower, TrialView
+from fras_common.errors import FrasError
 from fras_common.messages import RobotState, TaskStatus
 from fras_common.topics import ROBOT_STATE
 from fras_supervisor import free_port
@@ -138,9 +140,10 @@ class Cell:
         status = views[-1].task
         if not ended:
             # So that the next trial of this cell is not refused for this one's sake.
-            self._follower.abort("it has no end")
             deadline_s = time.monotonic() + PATIENCE_S
-            self._follower.follow(look, stop=lambda: time.monotonic() > deadline_s)
+            with suppress(FrasError):
+                self._follower.abort("it has no end")
+                self._follower.follow(look, stop=lambda: time.monotonic() > deadline_s)
         assert ended, f"no end within {PATIENCE_S} s: {status}"
         assert status is not None
         return status, folder / "audit.mcap"

@@ -60,7 +60,8 @@ class Topic(Generic[M]):
     kept : int
         How many the publisher keeps for who lost them or comes late, and the recorder remembers.
     awaited : bool
-        Somebody does nothing until it has come: who lost the last one is to learn so at once.
+        Somebody does nothing until it has come, and none follows by which its loss would show: who
+        lost it is to learn so at once.
     """
 
     key: str

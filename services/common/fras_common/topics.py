@@ -162,6 +162,7 @@ class ArmTopics:
             Qos.EVENT,
             "each change, 2 Hz",
             in_trial=False,
+            awaited=True,
         )
 
     @property

@@ -27,11 +27,15 @@ from fras_common.topics import (
     Topic,
 )
 from fras_monitor.mail import Mail
+from fras_monitor.pace import Due
 from fras_monitor.picture import Picture, apply, remembered, with_token
 
 ANSWER_S: Final = 2.0
-VERDICTS: Final = 100
-"""Each is a point of a plot: as many as may come between two pictures."""
+VERDICTS: Final = 500
+"""Each is a point of a plot: more than may come between two pictures."""
+MOST_GLANCE_S: Final = 0.1
+"""For how long states are waited for: a trial may stand."""
+CATCH_UP_S: Final = 0.5
 
 # Of these only the latest counts; of the others each does.
 LATEST: Final[tuple[Topic[Any], ...]] = (TISSUE_MODEL, CONTEXT, RECORDER_STATUS)
@@ -79,7 +83,10 @@ class Listener:
             bus.recent(ROBOT_STATE, 1),
         )
         self._verdicts = bus.recent(VERDICT, VERDICTS)
-        self._pauses = self._is_sparing = False
+        self._pauses = False
+        self._missing: set[type] = set()
+        self._missing_until_s = 0.0
+        self._catching_up = Due(CATCH_UP_S)
         bus.subscribe(HEALTH, self._on_health)
         bus.watch_tokens(lambda name, present: self.note(_Token(name, present)))
         self._catch_up(*MISSED)
@@ -90,8 +97,10 @@ class Listener:
 
     def look(self) -> Picture:
         """Take in what has arrived, and return all that is known."""
-        for recent in (*self._states, self._verdicts):
+        # Verdicts first: none is on a state that is not taken then.
+        for recent in (self._verdicts, *self._states):
             for message in recent.take():
+                self._missing.discard(type(message))
                 # At some time since then: of a state and the holds, which motion says as they
                 # change, what was heard meanwhile is the later word.
                 self._mail.append(message, self._looked_s)
@@ -103,7 +112,7 @@ class Listener:
         return self.picture
 
     def hear(self, *, sparingly: bool) -> None:
-        """Hear each state, or none until `resume`: most would be replaced before the next picture.
+        """Hear each state, or none until `has_states`: most are replaced before the next picture.
 
         Who hears each again is told by the recorder of those that came meanwhile.
         """
@@ -111,20 +120,24 @@ class Listener:
             self._pauses = True
             for recent in self._states:
                 recent.pause()
-        elif self._is_sparing:
-            self.resume()
+        elif self._lacks_states() and self._catching_up.take(time.monotonic()):
             self._catch_up(*STATES)
-        self._is_sparing = sparingly
 
-    def resume(self) -> bool:
-        """Hear them again; whether they were not heard."""
-        if not self._pauses:
-            return False
-        for recent in self._states:
-            recent.resume()
-        self._looked_s = time.monotonic()
-        self._pauses = False
-        return True
+    def _lacks_states(self) -> bool:
+        # In a replay that was set back verdicts of later may stand for a while.
+        return self.picture.is_behind and not self.picture.is_replay
+
+    def has_states(self, now_s: float) -> bool:
+        """Whether there are states to draw; where none were heard, whether one of each has come."""
+        if self._pauses:
+            for recent in self._states:
+                recent.resume()
+            self._pauses = False
+            self._missing = {one.type for one in STATES}
+            self._looked_s, self._missing_until_s = now_s, now_s + MOST_GLANCE_S
+        elif self._missing:
+            self.look()
+        return not self._missing or now_s >= self._missing_until_s
 
     def _catch_up(self, *topics: Topic[Any]) -> None:
         for topic in topics:

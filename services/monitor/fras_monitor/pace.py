@@ -9,6 +9,8 @@ NICENESS: Final = 10
 FRAME_S: Final = 0.05
 FAST: Final = 1.5
 """Simulated seconds in one of ours from which on a trial counts as run faster than life."""
+MOST_S: Final = 0.5
+"""Between two pictures, whatever one takes: who looks, and what was stopped, is told with them."""
 GLANCE_S: Final = 0.02
 """A tick or two of such a trial."""
 SHARE: Final = 0.02
@@ -82,11 +84,11 @@ class Frames:
         """
         since_s, went_s = now_s - self._drawn_s, simulated_s - self._simulated_s
         self.fast = went_s > FAST * since_s
-        period_s = max(FRAME_S, took_s / SHARE) if self.fast else FRAME_S
+        period_s = max(FRAME_S, min(took_s / SHARE, MOST_S)) if self.fast else FRAME_S
         self._drawn_s, self._simulated_s = now_s, simulated_s
         self._next_s = now_s + period_s
 
     def glance(self, now_s: float) -> float:
-        """Have the next picture wait for something to draw, and return for how long [s]."""
+        """Have the next picture wait a little for something to draw; return for how long [s]."""
         self._next_s = now_s + GLANCE_S
         return GLANCE_S

@@ -91,6 +91,11 @@ class Picture:
         """Whether a log is played back into the cell."""
         return self.is_there("replay")
 
+    @property
+    def is_remembered(self) -> bool:
+        """Whether the recorder can tell what was not heard: it remembers nothing of a replay."""
+        return self.is_there("recorder") and not self.is_replay
+
     def is_there(self, service: str) -> bool:
         """Whether some instance of a service shows that it lives."""
         return any(one.startswith(f"alive/{service}/") for one in self.tokens)
@@ -113,8 +118,16 @@ class Picture:
 
     @property
     def simulated_s(self) -> float:
-        """Up to where the arms have come in the trial."""
-        return self.tick * self.dt_s if self.of_trial(self.robot) is not None else 0.0
+        """Up to where the trial has come, as far as it is judged or its arms were heard."""
+        heard = (self.of_trial(self.robot), self.of_trial(self.verdict))
+        return max((one.tick for one in heard if one is not None), default=0) * self.dt_s
+
+    @property
+    def is_behind(self) -> bool:
+        """Whether a verdict was heard on states that were not."""
+        verdict = self.of_trial(self.verdict)
+        states = (self.of_trial(self.robot), self.of_trial(self.tissue))
+        return verdict is not None and any(one and one.tick < verdict.tick for one in states)
 
     def of_trial(self, heard: "Heard[H] | None") -> "H | None":
         """Return a message if it belongs to the current trial."""
@@ -178,13 +191,17 @@ def apply(picture: Picture, message: object, now_s: float) -> Picture:
 
 
 def remembered(picture: Picture, message: object) -> Picture:
-    """Take in what the recorder remembers: it counts only where nothing later has been heard."""
+    """Take in what the recorder remembers: it counts only where nothing later has been heard.
+
+    In a replay only where nothing has been heard: a recorder there remembers what was before it.
+    """
     name = _LATEST.get(type(message), "")
     if not name or not isinstance(message, Header):
         return picture
     heard: Heard[Header] | None = getattr(picture, name)
-    is_news = heard is None or heard.message.stamp_ns < message.stamp_ns
-    return apply(picture, message, 0.0) if is_news else picture
+    if heard is not None and (picture.is_replay or message.stamp_ns <= heard.message.stamp_ns):
+        return picture
+    return apply(picture, message, 0.0)
 
 
 def with_token(picture: Picture, token: str, present: bool) -> Picture:

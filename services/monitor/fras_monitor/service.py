@@ -98,19 +98,18 @@ class MonitorService:
         now_s, began_s = time.monotonic(), time.thread_time()
         if (wait_s := self._frames.wait_s(now_s)) > 0.0:
             return wait_s
-        if self._listener.resume():
+        self._audience.tell(self._hub, self.address, now_s)
+        if not self._listener.has_states(now_s):
             return self._frames.glance(now_s)
         picture = self._listener.look()
         self._host.tick = picture.tick
         if picture.holds is not None:
             self.stopper.see_holds(picture.holds.message.holds, picture.holds.at_s)
-        self._audience.tell(self._hub, self.address, now_s)
         if self._view.take(now_s):
             self._show(picture, now_s)
         self._scene.draw(picture)
         self._frames.drawn(now_s, time.thread_time() - began_s, picture.simulated_s)
-        # A replay has no recorder that would tell the last of the states that were not heard.
-        sparingly = self._frames.fast and not picture.is_replay
+        sparingly = self._frames.fast and picture.is_remembered
         self._listener.hear(sparingly=sparingly)
         self.stopper.hear(sparingly=sparingly)
         return self._frames.wait_s(time.monotonic())

@@ -104,6 +104,7 @@ class Stopper:
     ) -> None:
         self._bus = bus
         self._robot = bus.recent(ROBOT_STATE, 1)
+        self._hearing = threading.Lock()
         self._on_change = on_change
         self._clock = clock
         self._lock = threading.Lock()
@@ -121,16 +122,14 @@ class Stopper:
     def press(self) -> None:
         """Stop the arms; returns at once. Pressed again, motion is asked again."""
         self._change(lambda _: StopRecord(pressed_s=self._clock(), state="sent"))
-        with self._lock:
-            self._robot.resume()
         self._presses.put(True)
 
     def hear(self, *, sparingly: bool) -> None:
-        """Hear each state of the arms; or, as they move and so say more, none until a press."""
-        with self._lock:
+        """Hear each state of the arms, or none before the next press."""
+        with self._hearing:
             if not sparingly:
                 self._robot.resume()
-            elif self._record.state not in ("sent", "acknowledged"):
+            elif self.record.state not in ("sent", "acknowledged"):
                 self._robot.pause()
 
     def see_holds(self, holds: Mapping[str, str], at_s: float) -> None:
@@ -158,6 +157,8 @@ class Stopper:
 
     def _run(self) -> None:
         while self._presses.get():
+            with self._hearing:
+                self._robot.resume()
             while self.record.state == "sent" and self._presses.empty():
                 self._ask()
             while self.record.state == "acknowledged" and self._presses.empty():

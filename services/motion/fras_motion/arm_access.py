@@ -129,7 +129,10 @@ class SimulatedArms:
         if self._direct.moving:
             wait_s = min(wait_s, self._tick(held=held, now_s=now_s))
         arms = self._direct.snapshot(held=held)
-        self._face.publish(arms, {arm: self._direct.busy(arm) for arm in arms}, -1, now_s)
+        busy = {arm: self._direct.busy(arm) for arm in arms}
+        if not self._face.publish(arms, busy, -1, now_s):
+            # A trial faster than life may have said so just now.
+            wait_s = min(wait_s, self._face.due_in_s(now_s))
         return wait_s
 
     def _say_trial(self, trial: MotionTrial, now_s: float) -> float:

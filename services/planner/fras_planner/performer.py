@@ -96,7 +96,7 @@ class Performer:
         self.drive(None)
 
     def forget_results(self) -> None:
-        """Know of no action that has ended: another trial begins, whose goals are called alike."""
+        """Know of no action that has ended: a trial begins, none of whose goals is under way."""
         self._results.clear()
 
     @property

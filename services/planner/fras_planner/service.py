@@ -79,6 +79,7 @@ class PlannerService:
         # A start that is refused leaves what is being taken up as it is.
         self._restart.give_up()
         executive, _ = self._enter(request, scenario)
+        self._performer.forget_results()
         self._starter = pending
         self._performer.start(executive.run(), scenario.run.peer_timeout_s)
 
@@ -97,8 +98,6 @@ class PlannerService:
         self._executive, self._plans = executive, plans
         self._log.begin(executive, required=scenario.run.require_log)
         self._motion.begin(scenario.run.peer_timeout_s)
-        self._performer.forget_results()
-        # What came of the trial already is handed out here: the end of an action among it.
         self._host.enter_trial(request.trial)
         return executive, plans
 

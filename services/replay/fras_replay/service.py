@@ -19,7 +19,7 @@ from fras_replay.waiting import wait_s
 # Between two of them questions are answered.
 BURST = 64
 # Who lost something as fast as it went learns so from a heartbeat (0.3 s), and asks for it.
-LINGER_NS = NS // 2
+LINGER_NS = NS
 
 
 @dataclass(frozen=True)

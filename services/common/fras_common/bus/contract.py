@@ -94,7 +94,12 @@ class Recent(Protocol[M_co]):
         ...
 
     def resume(self) -> None:
-        """Hear again what is said from now on. Idempotent."""
+        """Hear again what is said from now on. Idempotent.
+
+        Raises
+        ------
+        BusClosed
+        """
         ...
 
 

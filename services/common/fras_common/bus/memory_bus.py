@@ -275,20 +275,27 @@ class _Ring:
     def __init__(self, at_most: int) -> None:
         self._kept = deque[RawSample](maxlen=at_most)
         self._hears = True
+        self._lock = threading.Lock()
 
     def note(self, sample: RawSample) -> None:
-        if self._hears:
-            self._kept.append(sample)
+        with self._lock:
+            if self._hears:
+                self._kept.append(sample)
 
     def take(self) -> list[RawSample]:
-        return [self._kept.popleft() for _ in range(len(self._kept))]
+        with self._lock:
+            taken = list(self._kept)
+            self._kept.clear()
+        return taken
 
     def pause(self) -> None:
-        self._hears = False
-        self._kept.clear()
+        with self._lock:
+            self._hears = False
+            self._kept.clear()
 
     def resume(self) -> None:
-        self._hears = True
+        with self._lock:
+            self._hears = True
 
 
 class _MemoryPublisher(Generic[M]):
