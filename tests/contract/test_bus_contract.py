@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 import pytest
 
-from fras_common.bus import Bus, BusClosed, RawSample
+from fras_common.bus import Bus, BusClosed, RawSample, Recent
 from fras_common.codec import MalformedMessage, decode, encode
 from fras_common.messages import (
     Header,
@@ -167,15 +167,23 @@ def test_a_subscriber_that_was_first_hears_a_latched_topic_once(open_bus: Open, 
     assert [m.messages for m in heard.count(2)] == [0, 1]
 
 
+def looking(recent: Recent[Any], seen: Callable[[Any], object]) -> Callable[[], None]:
+    """Return what looks once, and tells what it saw."""
+
+    def look() -> None:
+        for found in recent.take():
+            seen(found)
+
+    return look
+
+
 def test_who_looks_now_and_then_sees_the_latest_once(open_bus: Open, listen: Listen):
     seen, numbers = listen(), itertools.count()
     recent = open_bus("monitor/1").recent(RECORDER_STATUS, 1)
     assert not recent.take()
     publisher = open_bus("recorder/1").publisher(RECORDER_STATUS)
 
-    def look() -> None:
-        for found in recent.take():
-            seen(found)
+    look = looking(recent, seen)
 
     def put_and_look() -> None:
         publisher.put(status(next(numbers)))
@@ -196,9 +204,7 @@ def test_who_looks_now_and_then_sees_the_last_few_in_order(open_bus: Open, liste
     recent = monitor.recent(RECORDER_STATUS, 3)
     monitor.subscribe(RECORDER_STATUS, heard)
 
-    def look() -> None:
-        for found in recent.take():
-            seen(found)
+    look = looking(recent, seen)
 
     put_until(lambda: (publisher.put(status(0)), look()), seen)
     for number in range(1, 11):
@@ -217,9 +223,7 @@ def test_who_pauses_hears_nothing_of_meanwhile_and_then_again(open_bus: Open, li
     recent = monitor.recent(RECORDER_STATUS, 10)
     monitor.subscribe(RECORDER_STATUS, heard)
 
-    def look() -> None:
-        for found in recent.take():
-            seen(found)
+    look = looking(recent, seen)
 
     put_until(lambda: (publisher.put(status(0)), look()), seen)
     recent.pause()

@@ -114,7 +114,7 @@ class Listener:
     def hear(self, *, sparingly: bool) -> None:
         """Hear each state, or none until `has_states`: most are replaced before the next picture.
 
-        Who hears each again is told by the recorder of those that came meanwhile.
+        Of who hears each, and yet lacks some that were judged, the recorder is asked for them.
         """
         if sparingly:
             self._pauses = True
@@ -128,7 +128,7 @@ class Listener:
         return self.picture.is_behind and not self.picture.is_replay
 
     def has_states(self, now_s: float) -> bool:
-        """Whether there are states to draw; where none were heard, whether one of each has come."""
+        """Hear states again if none were heard; whether one of each has come since, or will not."""
         if self._pauses:
             for recent in self._states:
                 recent.resume()
